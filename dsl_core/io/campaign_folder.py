@@ -62,7 +62,11 @@ class CampaignFolder:
             raise StoreError(
                 f"{path} is not a campaign: it has no {CAMPAIGN_NAME}. Give the folder of a campaign."
             )
-        return cls(path, read_record(path / CAMPAIGN_NAME, CampaignInfo))
+        remedy = (
+            "Restore it from a copy, or delete it and begin the campaign in this folder again, with its rig"
+            " and options: what was captured is kept."
+        )
+        return cls(path, read_record(path / CAMPAIGN_NAME, CampaignInfo, remedy))
 
     @classmethod
     def begin(
@@ -88,12 +92,12 @@ class CampaignFolder:
         """A campaign, new or begun, as it would be; nothing is written before `save`.
 
         ``rig`` None means the rig the campaign was begun with, for a new one the twin. ``settings`` add to
-        those the campaign has. Raises `StoreError` when the campaign was begun with another rig or options,
-        or when the folder holds something else.
+        those the campaign has. One whose ``campaign.json`` is lost is begun again and keeps its captures.
+        Raises `StoreError` when the campaign was begun with another rig or options, when no rig is named for
+        one that lost its file, or when the folder holds something else.
         """
         if not (path / CAMPAIGN_NAME).exists():
-            if path.is_dir() and not all(_is_unborn(each) for each in path.iterdir()):
-                raise StoreError(f"{path} is neither empty nor a campaign. Choose a new folder.")
+            _require_room(path, rig)
             info = CampaignInfo(created=now(), rig=rig or "twin", options=dict(options))
         else:
             info = cls.open(path).info
@@ -183,6 +187,18 @@ def take_campaign(path: Path) -> FolderLock:
         lock.release()
         raise store_error(path, error) from error
     return lock
+
+
+def _require_room(path: Path, rig: str | None) -> None:
+    """Raise `StoreError` where a campaign would take other files, or captures of another rig, for its own."""
+    if any(path.glob(f"*/*/{NOTE_NAME}")):
+        if rig is None:
+            raise StoreError(
+                f"{path} holds the captures of a campaign, but no {CAMPAIGN_NAME}. To continue it, name its"
+                " rig with --rig, and with --option and --set what it was begun with."
+            )
+    elif path.is_dir() and not all(_is_unborn(each) for each in path.iterdir()):
+        raise StoreError(f"{path} is neither empty nor a campaign. Choose a new folder.")
 
 
 def _is_unborn(path: Path) -> bool:

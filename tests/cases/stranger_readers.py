@@ -235,9 +235,9 @@ def _add_to_manifest(path: Path, content: dict[str, Any]) -> None:
 
 def _make_step(folder: Path) -> None:
     from dsl_core.campaign.common.captures import CaptureNote
-    from dsl_core.io.campaign_folder import NOTE_NAME
     from dsl_core.devices.base import CameraInfo, ProjectorInfo
     from dsl_core.devices.conditions import conditions_of
+    from dsl_core.io.campaign_folder import NOTE_NAME
     from dsl_core.io.records import replace_record
 
     camera = CameraInfo("camera", "1", 12, 8, "RGGB", 12, (0.1, 1000.0))

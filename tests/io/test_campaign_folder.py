@@ -101,6 +101,25 @@ def test_a_campaign_that_was_killed_while_it_began_may_begin_again(tmp_path: Pat
     assert CampaignFolder.begin(tmp_path, None, {}).info.rig == "twin"
 
 
+def test_a_campaign_whose_first_file_is_damaged_can_be_continued_as_it_advises(
+    campaign: CampaignFolder,
+) -> None:
+    campaign.propose(fit("first"))
+    accepted = campaign.accept("geometry")
+    step = campaign.home("geometry") / "pose-01"
+    step.mkdir(parents=True)
+    (step / "capture.json").write_text("{}")
+    path = campaign.path / "campaign.json"
+    path.write_text(path.read_text()[:60])
+    with pytest.raises(StoreError, match=r"cut off.* delete it and begin the campaign in this folder again"):
+        CampaignFolder.open(campaign.path)
+    path.unlink()
+    with pytest.raises(StoreError, match=r"holds the captures of a campaign.*--rig"):
+        CampaignFolder.begin(campaign.path, None, {})
+    again = CampaignFolder.begin(campaign.path, "twin", {"size": "32x24"})
+    assert again.accepted("geometry") == accepted
+
+
 def test_a_damaged_file_names_its_first_wrong_field(campaign: CampaignFolder) -> None:
     path = campaign.path / "geometry.json"
     path.write_text('{"name": "geometry"}', encoding="utf-8")
