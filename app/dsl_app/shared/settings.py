@@ -117,20 +117,23 @@ def folder_for(path: Path) -> Path:
 def load_settings(path: Path) -> tuple[Settings, str]:
     """Settings and a sentence on what was wrong with the file (empty: nothing).
 
-    An invalid field keeps its default; a file that cannot be read is set aside. Settings never keep the
-    application from starting.
+    An invalid field keeps its default; a damaged file is set aside, one that cannot be read now stays.
+    Settings never keep the application from starting.
     """
-    settings, trouble = _load(path)
+    try:
+        settings, trouble = _load(path)
+    except OSError as error:
+        return Settings(), f"The settings {path} could not be read ({error}); the defaults are used."
     return Settings() if settings is None else settings, trouble
 
 
 def _load(path: Path) -> tuple[Settings | None, str]:
-    """As `load_settings`, with None where there is no file."""
+    """As `load_settings`, with None where there is no file; raises `OSError` for one that stays."""
     try:
         content = read_json(path)
     except FileNotFoundError:
         return None, ""
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         aside = set_aside(path)
         return Settings(), f"The settings {path} could not be read ({error}); the defaults are used.{aside}"
     if not isinstance(content, dict):
@@ -144,8 +147,12 @@ def save_settings(settings: Settings, path: Path) -> str:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(path, settings.model_dump_json(indent=1).encode())
     except (OSError, StoreError) as error:
-        return f"The settings could not be saved: {error}"
+        return _unsaved(error)
     return ""
+
+
+def _unsaved(error: Exception) -> str:
+    return f"The settings could not be saved: {error}"
 
 
 def _tolerant(content: dict[str, Any], path: Path) -> tuple[Settings, str]:
@@ -170,15 +177,20 @@ class SettingsFile:
 
     def save(self) -> str:
         """Write what changed; all of it where the file is gone or wrong. Returns what went wrong, or ""."""
-        saved, trouble = _load(self.path)
-        if trouble:
-            return save_settings(self._settings, self.path)
-        return self._save_over(saved, tuple(Settings.model_fields))
+        return self._save(tuple(Settings.model_fields), may_replace=True)
 
     def save_early(self) -> str:
         """Write what must outlive a crash now; the rest stays as it was saved. Returns what went wrong."""
-        saved, trouble = _load(self.path)
-        return trouble or self._save_over(saved, EARLY)
+        return self._save(EARLY, may_replace=False)
+
+    def _save(self, names: tuple[str, ...], *, may_replace: bool) -> str:
+        try:
+            saved, trouble = _load(self.path)
+        except OSError as error:
+            return _unsaved(error)  # it may be sound
+        if trouble:
+            return save_settings(self._settings, self.path) if may_replace else trouble
+        return self._save_over(saved, names)
 
     def _save_over(self, saved: Settings | None, names: tuple[str, ...]) -> str:
         now, known = self._settings, self._known

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Literal
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import set_aside
 from dsl_core.io.neighbours import beside_result
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.model.base import Record
@@ -68,13 +67,13 @@ def save_annotations(annotations: Annotations, result: Path) -> Path:
 def load_annotations(result: Path) -> Annotations:
     """The marks next to a result, none where there is no file.
 
-    Raises `StoreError` for a damaged file, which is set aside, so that new marks do not replace it.
+    Raises `StoreError` for a file that cannot be read now; whoever writes marks next must not replace it.
     """
     path = annotations_path(result)
+    remedy = "Try again, restore it from a copy, or rename it to go on without its marks."
     try:
-        if not path.exists():
-            return Annotations()
-        remedy = "The result is opened without them."
         return read_record(path, Annotations, remedy, called="The marks in", fault="cannot be read")
     except StoreError as error:
-        raise StoreError(f"{error}{set_aside(path)}") from error
+        if isinstance(error.__cause__, FileNotFoundError):
+            return Annotations()
+        raise

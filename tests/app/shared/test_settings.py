@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import errno
 import json
+import os
 from pathlib import Path
 
+import pytest
 from dsl_app.shared.settings import (
     RECENT_COUNT,
     RecentFiles,
@@ -32,6 +35,28 @@ def test_a_damaged_file_is_set_aside_and_told(tmp_path: Path) -> None:
     assert settings == Settings()
     assert "could not be read" in trouble
     assert (tmp_path / "settings.damaged.json").read_text() == '{"theme": "dar'
+
+
+def test_a_file_that_cannot_be_read_for_a_moment_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, kept = tmp_path / "settings.json", Settings(theme="dark", rig="bench")
+    save_settings(kept, path)
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("dsl_app.shared.settings.read_json", fail)
+        settings, trouble = load_settings(path)
+        file = SettingsFile(settings, path)
+        assert "could not be read" in trouble
+        assert "could not be saved" in file.save()
+        assert "could not be saved" in file.save_early()
+    assert (settings, load_settings(path)) == (Settings(), (kept, ""))
+    settings.tour_seen = True
+    assert file.save() == ""
+    assert load_settings(path)[0] == kept.model_copy(update={"tour_seen": True})
 
 
 def test_one_wrong_field_costs_only_itself(tmp_path: Path) -> None:

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import errno
+import os
+import re
 from pathlib import Path
 
 import pytest
@@ -39,13 +42,27 @@ def test_no_file_means_no_marks(tmp_path: Path) -> None:
     assert load_annotations(tmp_path / "scan.zarr") == Annotations()
 
 
-def test_a_damaged_file_is_named_and_put_aside(tmp_path: Path) -> None:
-    (tmp_path / "scan.marks.json").write_text('{"pins": 3}')
-    with pytest.raises(StoreError, match=r"scan\.marks\.json"):
+@pytest.mark.parametrize("content", ['{"pins": 3}', '{"schema_version": 2}', "later"])
+def test_a_file_that_cannot_be_read_is_named_and_stays(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "scan.marks.json"
+    path.write_text(content)
+    with pytest.raises(StoreError, match=r"scan\.marks\.json cannot be read.*rename it"):
         load_annotations(tmp_path / "scan.zarr")
-    assert not (tmp_path / "scan.marks.json").exists()
-    assert (tmp_path / "scan.marks.damaged.json").read_text() == '{"pins": 3}'
-    (tmp_path / "scan.marks.json").write_text("later")
-    with pytest.raises(StoreError, match=r"scan\.marks\.damaged2\.json"):
-        load_annotations(tmp_path / "scan.zarr")
-    assert (tmp_path / "scan.marks.damaged.json").read_text() == '{"pins": 3}'
+    assert {each.name: each.read_text() for each in tmp_path.iterdir()} == {path.name: content}
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.EACCES, errno.EMFILE, errno.ENOMEM])
+def test_marks_of_a_drive_that_does_not_answer_for_a_moment_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    marks = Annotations(pins=(PinRecord(name="pin 1", pixel=(3, 4)),))
+    save_annotations(marks, tmp_path / "scan.zarr")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "stat", fail)
+        with pytest.raises(StoreError, match=re.escape(os.strerror(number))):
+            load_annotations(tmp_path / "scan.zarr")
+    assert load_annotations(tmp_path / "scan.zarr") == marks

@@ -86,7 +86,7 @@ class MarkStorage:
             saved = load_annotations(result.path)
             self._stamp = _stamp_of(annotations_path(result.path))
         except DslError as error:
-            self._damaged(result, str(error))
+            self._fail(str(error))
             return
         if saved == Annotations():
             self._finish()
@@ -112,14 +112,6 @@ class MarkStorage:
                 is_minor=True,
             )
         )
-
-    def _damaged(self, result: ResultArrays, sentence: str) -> None:
-        path = annotations_path(result.path)
-        if there(path) or barrier(path):
-            self._fail(sentence)
-        else:  # it was set aside, so that nothing can replace it
-            self._notifier.tell("warning", sentence)
-            self._finish()
 
     def _tell_troubles(self, marks: tuple[Mark, ...]) -> None:
         bad = [mark for mark in marks if mark.trouble]

@@ -141,7 +141,6 @@ def test_starting_with_no_marks_keeps_the_file(path: Path) -> None:
 
 def test_a_file_that_cannot_be_put_aside_is_not_replaced(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dsl_app.results.marks.storage.set_aside", lambda _: "")
-    monkeypatch.setattr("dsl_core.io.result.annotations_file.set_aside", lambda _: "")
     path.with_name(MARKS).write_text("{")
     bench = Bench(path)
     assert "cannot be read" in bench.told
