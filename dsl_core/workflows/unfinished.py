@@ -24,6 +24,7 @@ from dsl_core.progress import Progress
 from dsl_core.workflows.scans import reconstruct_to
 
 _ENDING, _KEY, _LOCK, _ARRAYS = ".unfinished", "key.json", "writer.lock", "result.zarr"
+_OVERWRITE = "overwrite"
 #: After the facts, a key ends with shape, origin, height of a band of rows, and wavelengths.
 _LAYOUT = re.compile(r"\((\d+), \d+\) \(\d+, \d+\) ([1-9]\d*) \[")
 #: What reading a damaged key raises; the last two are for what is nested too deeply.
@@ -47,7 +48,8 @@ class UnfinishedScan:
 class UnfinishedResult:
     """A result of which ``done`` of ``total`` bands of rows are there.
 
-    ``scan``, ``calibration`` and ``options`` are what it was begun with.
+    ``scan``, ``calibration`` and ``options`` are what it was begun with, ``overwrite`` whether that replaces
+    what is at its ``target``.
     """
 
     target: Path
@@ -56,6 +58,7 @@ class UnfinishedResult:
     total: int
     calibration: Rig
     options: Options
+    overwrite: bool = False
 
 
 def unfinished_scans(folder: Path) -> tuple[UnfinishedScan, ...]:
@@ -93,7 +96,7 @@ def resume_result(found: UnfinishedResult, progress: Progress | None = None) -> 
     """Continue an interrupted reconstruction to its end; raises what `reconstruct_to` raises."""
     # Whether the calibration may be used was settled when it was begun.
     given = found.scan, found.calibration, found.options, progress
-    return reconstruct_to(found.target, *given, override_calibration=True)
+    return reconstruct_to(found.target, *given, override_calibration=True, overwrite=found.overwrite)
 
 
 def _read(work: Path) -> UnfinishedResult:
@@ -111,6 +114,7 @@ def _read(work: Path) -> UnfinishedResult:
         -(-rows // height),
         Rig.model_validate_json(rig),
         _options_of(options),
+        (work / _OVERWRITE).exists(),
     )
 
 

@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from dsl_core.capture.metering import WHITE_IN_DOUBT
+from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME, staging
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.records import replace_record
@@ -42,6 +43,11 @@ OPTIONS = Options(spectra=False, refine_columns=False, band_rows=16)
 def killed(scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the scan, whose reconstruction was killed after its first band of rows."""
     copy = shutil.copytree(scan, tmp_path / "a.dsl")
+    _kill_reconstruction(copy, monkeypatch)
+    return copy
+
+
+def _kill_reconstruction(scan: Path, monkeypatch: pytest.MonkeyPatch, *, overwrite: bool = False) -> None:
     write, notes = write_atomic, list[str]()
 
     def dies(path: Path, data: bytes) -> None:
@@ -53,8 +59,7 @@ def killed(scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     with monkeypatch.context() as patch:
         patch.setattr(row_writer, "write_atomic", dies)
         with pytest.raises(KeyboardInterrupt):
-            scans.reconstruct_to(tmp_path / "a.zarr", copy, None, OPTIONS)
-    return copy
+            scans.reconstruct_to(scan.with_suffix(".zarr"), scan, None, OPTIONS, overwrite=overwrite)
 
 
 def test_an_interrupted_reconstruction_is_found_and_continued(killed: Path, tmp_path: Path) -> None:
@@ -64,6 +69,26 @@ def test_an_interrupted_reconstruction_is_found_and_continued(killed: Path, tmp_
     assert resume_result(found) == tmp_path / "a.zarr"
     assert "depth_mm" in load_result(tmp_path / "a.zarr")
     assert unfinished_results(tmp_path) == ()
+
+
+def test_one_that_was_to_replace_a_result_still_does(
+    killed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (begun,) = unfinished_results(tmp_path)
+    resume_result(begun)
+    _kill_reconstruction(killed, monkeypatch, overwrite=True)
+    (found,) = unfinished_results(tmp_path)
+    assert (begun.overwrite, found.overwrite) == (False, True)
+    assert resume_result(found) == tmp_path / "a.zarr"
+    assert unfinished_results(tmp_path) == ()
+
+
+def test_a_result_that_came_meanwhile_is_not_replaced(killed: Path, tmp_path: Path) -> None:
+    (found,) = unfinished_results(tmp_path)
+    scans.reconstruct_to(tmp_path / "b.zarr", killed, None, OPTIONS)
+    (tmp_path / "b.zarr").rename(found.target)
+    with pytest.raises(StoreError, match="already exists"):
+        resume_result(found)
 
 
 def test_a_run_killed_as_its_result_was_moved_in_is_not_offered(

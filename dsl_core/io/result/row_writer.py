@@ -2,7 +2,7 @@
 
 Until it is finished the result is in a hidden folder next to its place, ``.NAME.unfinished``: its arrays, and
 a file for each band of rows that is complete. What it is a result of is in ``key.json``; another run resumes
-it only if that is the same to the letter.
+it only if that is the same to the letter. An empty file ``overwrite`` says that an older result is replaced.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _log = logging.getLogger(__name__)
-_KEY, _LOCK, _ARRAYS = "key.json", "writer.lock", "result.zarr"
+_KEY, _LOCK, _ARRAYS, _OVERWRITE = "key.json", "writer.lock", "result.zarr", "overwrite"
 
 
 class RowWriter:
@@ -89,6 +89,10 @@ class RowWriter:
                 self._clear()
                 zarr.create_group(self.work / _ARRAYS, zarr_format=3)
                 write_atomic(self.work / _KEY, key)
+            if self._overwrite:
+                (self.work / _OVERWRITE).touch()
+            else:
+                (self.work / _OVERWRITE).unlink(missing_ok=True)
 
     def note_of(self, rows: slice) -> str | None:
         """The note of rows that are complete; None for others."""
