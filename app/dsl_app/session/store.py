@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import os
-import platform
 import re
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
@@ -21,9 +20,11 @@ from dsl_app.session.records import Session
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import set_aside, write_atomic
 from dsl_core.io.reading import read_bounded
+from dsl_core.io.scan.origin import computer_name
 
 _log = logging.getLogger(__name__)
 _PREFIX = "session-"
+_ADVICE = "Use File, Open recent to open your files."
 
 
 class SessionStore:
@@ -44,7 +45,7 @@ class SessionStore:
         self._writing.set_result("")
         self._folder, self._collect = folder, collect
         self._process = os.getpid() if process is None else process
-        self._host = re.sub(r"[^\w.-]", "_", platform.node())
+        self._host = re.sub(r"[^\w-]", "_", computer_name())
         self._path = folder / f"{_PREFIX}{self._host}-{self._process}.json"
         self._latest: Session | None = None
         self._has_complained = False
@@ -94,23 +95,28 @@ class SessionStore:
     def crashed_session(self) -> tuple[Session | None, str]:
         """The newest session of a program that crashed here, and a sentence on one that cannot be read.
 
-        All sessions of crashed programs are removed, so that they are offered once.
+        All sessions of crashed programs that can be read are removed, so that they are offered once.
         """
         newest: Session | None = None
         trouble = ""
         for path in sorted(self._folder.glob(f"{_PREFIX}*.json"), key=_age, reverse=True):
-            # Files of earlier versions name no computer.
+            # Files of earlier versions name no computer, or its domain as well.
             host, _, number = path.stem.removeprefix(_PREFIX).rpartition("-")
-            if host not in ("", self._host) or not number.isdigit():
+            if host.partition(".")[0] not in ("", self._host) or not number.isdigit():
                 continue
             if int(number) != self._process and is_running(int(number)):
                 continue
             try:
                 found = Session.model_validate_json(read_bounded(path))
-            except (OSError, ValidationError):
+            except FileNotFoundError:
+                continue  # another program that was started just now offers it
+            except OSError as error:
+                trouble = f"The session before the crash could not be read now ({error}). {_ADVICE}"
+                continue
+            except ValidationError:
                 trouble = (
                     "The session before the crash could not be read: its file is damaged."
-                    f"{set_aside(path)} Use File, Open recent to open your files."
+                    f"{set_aside(path)} {_ADVICE}"
                 )
                 continue
             path.unlink(missing_ok=True)

@@ -30,12 +30,23 @@ def rig_notes(name: str, options: Mapping[str, str]) -> dict[str, str]:
 
 def is_of_this_computer(notes: Mapping[str, object]) -> bool:
     """Whether the notes were written on this computer, by this user."""
-    return notes.get(_COMPUTER) == _this_computer()
+    # Earlier versions noted the whole name.
+    return notes.get(_COMPUTER) in (_this_computer(), _this_computer(platform.node()))
 
 
-def _this_computer() -> str:
+def computer_name() -> str:
+    """The name of this computer without the domain, which many get from whatever network they are in.
+
+    >>> computer_name() in platform.node() and "." not in computer_name()
+    True
+    """
+    return platform.node().partition(".")[0]
+
+
+def _this_computer(name: str | None = None) -> str:
     """A digest, so that a scan that is handed on names neither computer nor user."""
-    return hashlib.sha256(f"{platform.node()}\n{Path.home()}".encode()).hexdigest()[:16]
+    name = computer_name() if name is None else name
+    return hashlib.sha256(f"{name}\n{Path.home()}".encode()).hexdigest()[:16]
 
 
 def rig_of_notes(notes: Mapping[str, object]) -> tuple[str, dict[str, str]] | None:

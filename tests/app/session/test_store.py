@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -60,6 +61,35 @@ def test_what_a_program_on_another_computer_has_open_is_left_to_it(
     here.save()
     assert SessionStore(tmp_path, Session).crashed_session() == (LEAF, "")
     assert [path.name for path in tmp_path.iterdir()] == [f"session-lab-2-{gone}.json"]
+
+
+def test_a_session_is_found_again_in_another_network(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gone: int
+) -> None:
+    monkeypatch.setattr("platform.node", lambda: "Marias-Book.fritz.box")
+    SessionStore(tmp_path, lambda: LEAF, process=gone).save()
+    monkeypatch.setattr("platform.node", lambda: "Marias-Book.local")
+    (file,) = tmp_path.iterdir()
+    by_earlier_versions = file.rename(tmp_path / f"session-Marias-Book.fritz.box-{gone}.json")
+    assert SessionStore(tmp_path, Session).crashed_session() == (LEAF, "")
+    assert not by_earlier_versions.exists()
+    SessionStore(tmp_path, lambda: LEAF, process=gone).save()
+    assert SessionStore(tmp_path, Session).crashed_session() == (LEAF, "")
+
+
+def test_a_session_that_cannot_be_read_now_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gone: int
+) -> None:
+    SessionStore(tmp_path, lambda: LEAF, process=gone).save()
+
+    def fail(path: Path) -> bytes:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("dsl_app.session.store.read_bounded", fail)
+        found, trouble = SessionStore(tmp_path, Session).crashed_session()
+    assert (found, "could not be read now" in trouble) == (None, True)
+    assert SessionStore(tmp_path, Session).crashed_session() == (LEAF, "")
 
 
 def test_a_damaged_session_is_put_aside_with_a_sentence(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import pytest
@@ -89,6 +90,16 @@ def test_a_scan_knows_its_computer_and_user_without_naming_them(monkeypatch: pyt
     assert not is_of_this_computer({})
     monkeypatch.setattr("platform.node", lambda: "another")
     assert not is_of_this_computer(notes)
+
+
+def test_a_computer_that_is_in_another_network_is_still_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platform.node", lambda: "Marias-Book.fritz.box")
+    notes = rig_notes("lab", {})
+    home = hashlib.sha256(f"Marias-Book.fritz.box\n{Path.home()}".encode()).hexdigest()[:16]
+    assert is_of_this_computer(notes)
+    assert is_of_this_computer({"scanned_on": home}), "as earlier versions noted it"
+    monkeypatch.setattr("platform.node", lambda: "Marias-Book.local")
+    assert is_of_this_computer(notes)
 
 
 def test_a_calibration_is_the_same_whatever_it_is_called() -> None:
