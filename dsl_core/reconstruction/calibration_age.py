@@ -157,8 +157,9 @@ def unseen_since(rig: Rig, captured: str) -> str:
     """Sentences on what a scan ``captured`` at a time (ISO 8601) leaves open; empty for a fresh calibration.
 
     Light that has become weaker looks like a darker surface, and a projector that has turned like a nearer or
-    farther one: no residual shows either. The oldest part of the calibration counts for what has moved, the
-    last measurement of it for the light. Nothing is said where a date is missing or cannot be read.
+    farther one: no residual shows either. The part of the calibration that is farthest from the scan counts
+    for what has moved, the nearest measurement of the light for that. Nothing is said where a date is missing
+    or cannot be read.
     """
     return " ".join(part for part in (_of_light(rig, captured), _of_mounts(rig, captured)) if part)
 
@@ -199,13 +200,14 @@ def _of_mounts(rig: Rig, captured: str) -> str:
     scanned, accepted = _time(captured), [time for time in map(_time, dates) if time is not None]
     if scanned is None or not accepted:
         return ""
-    age = scanned - min(accepted)
+    farthest = max(accepted, key=lambda time: abs(scanned - time))
+    age, which = abs(scanned - farthest), "older" if farthest < scanned else "newer"
     if age <= FRESH:
         return ""
     return (
-        f"The calibration is {age.days} days older than this scan. No scan shows by itself whether camera or"
-        " projector have moved a little since, which puts depth off: run the drift check, or scan a surface"
-        " that you know."
+        f"The calibration is {age.days} days {which} than this scan. No scan shows by itself whether camera"
+        " or projector have moved a little in between, which puts depth off: run the drift check, or scan a"
+        " surface that you know."
     )
 
 
