@@ -52,7 +52,9 @@ def import_capture(
 
     encoding = encoding_named(options.encoding)
     if options.guess:
-        check_targets([_mapping_path(source, options)], overwrite=options.force)
+        path = _mapping_path(source, options)
+        # One that is there may be what is guessed: of the same command, which was interrupted.
+        check_targets([path], overwrite=options.force or path.is_file())
     if target is not None:
         require_name(target)
     if target is not None and not target.is_dir():
@@ -151,10 +153,21 @@ def _guessed(output: Output, source: Path, rig: Rig | None, options: PictureOpti
         guess = guess_mapping(source, size, options.chosen, progress, encoding_named(options.encoding))
     _print(output, guess.mapping, guess.table)
     path = _mapping_path(source, options)
-    write_record(path, guess.mapping, overwrite=options.force, sealed=False)
+    if not _is_saved(guess.mapping, path):
+        write_record(path, guess.mapping, overwrite=options.force, sealed=False)
     output.say(f"The mapping is saved in {path}; correct it there and use it with --mapping.")
     output.put(mapping=path, others=list(guess.others))
     return guess.mapping
+
+
+def _is_saved(mapping: Mapping, path: Path) -> bool:
+    """Whether a file holds this mapping."""
+    from dsl_core.workflows.captures import load_mapping
+
+    try:
+        return load_mapping(path) == mapping
+    except StoreError:
+        return False
 
 
 def encoding_named(text: str | None) -> Encoding | None:

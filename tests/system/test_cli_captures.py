@@ -133,6 +133,31 @@ def test_rows_alone_are_imported_and_told(
     assert " % of the pixels have a row." in " ".join(capsys.readouterr().out.split())
 
 
+def test_an_interrupted_import_by_a_guess_is_continued_by_the_same_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    write(tmp_path / "set", {f"im{i:02d}.png": p for i, p in enumerate([*pictures, white, black])})
+    line = ["import", "set", "--guess", "--projector", "128x96", "-o", "a.dsl"]
+
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("dsl_core.workflows.captures._write", stop)
+        assert main(line) != 0
+    assert Path("set.mapping.json").exists()
+    assert main(line) == 0
+    assert "Imported to a.dsl" in capsys.readouterr().out
+    changed = Path("set.mapping.json")
+    changed.write_text(changed.read_text().replace('"inverse"', '"none"'))
+    content = changed.read_bytes()
+    assert main(line) == 2
+    assert "set.mapping.json already exists" in capsys.readouterr().err
+    assert changed.read_bytes() == content
+
+
 def test_a_guess_that_decodes_little_is_kept_but_not_imported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
