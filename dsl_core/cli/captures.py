@@ -161,7 +161,7 @@ def _guessed(output: Output, source: Path, rig: Rig | None, options: PictureOpti
 
 
 def _is_saved(mapping: Mapping, path: Path) -> bool:
-    """Whether a file holds this mapping."""
+    """Whether a file contains this mapping."""
     from dsl_core.workflows.captures import load_mapping
 
     try:

@@ -94,7 +94,7 @@ class CampaignFolder:
         ``rig`` None means the rig the campaign was begun with, for a new one the twin. ``settings`` add to
         those the campaign has. One whose ``campaign.json`` is lost is begun again and keeps its captures.
         Raises `StoreError` when the campaign was begun with another rig or options, when no rig is named for
-        one that lost its file, or when the folder holds something else.
+        one that lost its file, or when the folder contains something else.
         """
         if not (path / CAMPAIGN_NAME).exists():
             _require_room(path, rig)

@@ -78,7 +78,9 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
     assert list(info["accepted"]) == ["geometry", "selftest"]
     # A second time nothing is captured, and the library gets no second version.
     before = (folder / "geometry" / "pose" / "capture.json").stat().st_mtime_ns
-    assert give("calibrate", "all", folder, "--yes", "--name", "lab 3").code == 0
+    again = give("calibrate", "all", folder, "--yes", "--name", "lab 3")
+    assert again.code == 0
+    assert "scan SCAN.dsl --calibration 'lab 3'" in " ".join(again.out.split())
     assert (folder / "geometry" / "pose" / "capture.json").stat().st_mtime_ns == before
     assert len(CalibrationLibrary().stamps("lab 3")) == 1
     # Nor does it for what a drift check has found of the light since.

@@ -70,7 +70,7 @@ def load_annotations(result: Path) -> Annotations:
     Raises `StoreError` for a file that cannot be read now; whoever writes marks next must not replace it.
     """
     path = annotations_path(result)
-    remedy = "Try again, restore it from a copy, or rename it to go on without its marks."
+    remedy = "Try again, restore it from a copy, or rename it to continue without its marks."
     try:
         return read_record(path, Annotations, remedy, called="The marks in", fault="cannot be read")
     except StoreError as error:
