@@ -51,7 +51,11 @@ def _module(name: str) -> str:
 
 
 def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
-    """A recipe from texts, each read as `_value` does; a value stands for a list of one, no text for none."""
+    """A recipe from texts, each read as `_value` does; a value stands for a list of one.
+
+    ``none``, and no text for what is not a list, is the usual value; texts of files and folders are taken as
+    they are.
+    """
     from pydantic import TypeAdapter, ValidationError
 
     known = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
@@ -64,10 +68,18 @@ def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
         return kind()
     try:
         types = get_type_hints(kind)
-        values = {key: _value(text) for key, text in settings.items()}
+        lists = {key for key in settings if get_origin(types[key]) is tuple}
+        usual = {key for key, text in settings.items() if text == "none" or (not text and key not in lists)}
+        given = {key: text for key, text in settings.items() if key not in usual}
+        values = {key: text if types[key] is str else _value(text) for key, text in given.items()}
         for key, value in values.items():
-            if get_origin(types[key]) is tuple and not isinstance(value, list):
-                values[key] = [] if value == "" else [value]
+            if key in lists:
+                values[key] = value if isinstance(value, list) else [value] if value != "" else []
+            elif types[key] is float and re.fullmatch(r"-?\d+,\d+", given[key]):
+                raise CalibrationError(
+                    f"A setting of {name} is wrong: {key} must be a number with a decimal point, such as"
+                    f" {given[key].replace(',', '.')} (given {given[key]})."
+                )
         return TypeAdapter(kind).validate_python(values)
     except ValidationError as error:
         raise CalibrationError(f"A setting of {name} is wrong: {problems_in_words(error)}.") from error

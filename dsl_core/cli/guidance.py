@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,9 +107,16 @@ def figures_json(figures: Sequence[Figure]) -> list[dict[str, object]]:
 
 @contextmanager
 def opened_campaign(
-    folder: Path, rig: str | None, options: dict[str, str], settings: dict[str, dict[str, str]]
+    folder: Path,
+    rig: str | None,
+    options: dict[str, str],
+    settings: dict[str, dict[str, str]],
+    judge: Callable[[CampaignFolder, DeviceRig], object] | None = None,
 ) -> Iterator[tuple[CampaignFolder, DeviceRig]]:
-    """A campaign that no other process writes, and the open devices of its rig."""
+    """A campaign that no other process writes, and the open devices of its rig.
+
+    What ``judge`` refuses is not written down: the next command would find the same setting.
+    """
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.campaign_folder import CampaignFolder, take_campaign
 
@@ -119,6 +126,8 @@ def opened_campaign(
         folder.mkdir(parents=True, exist_ok=True)
         lock = take_campaign(folder)
         try:
+            if judge is not None:
+                judge(campaign, devices)
             campaign.save()
             yield campaign, devices
         finally:
@@ -180,13 +189,18 @@ def run_guided(
     output, settings = Output(json), {name: parse_options(set_)}
     command = f"dsl-scan {name if name == 'selftest' else f'calibrate {name}'} {quoted(campaign)}"
     load_recipe(name, settings[name])  # wrong settings are reported before anything is written
+
+    def session_of(folder: CampaignFolder, devices: DeviceRig) -> CalibrationSession:
+        found = CalibrationSession(load_recipe(name, folder.info.settings.get(name)), devices, folder)
+        found.statuses()  # settings that these devices do not take are refused
+        return found
+
     with (
         # Before the devices are open there is nothing to resume.
-        opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
+        opened_campaign(campaign, rig, parse_options(option), settings, session_of) as (folder, devices),
         resumed_by(command if kept else None),
     ):
-        recipe = load_recipe(name, folder.info.settings.get(name))
-        session = CalibrationSession(recipe, devices, folder)
+        session = session_of(folder, devices)
         before = session.accepted()
         if again:
             redo = [each.step.key for each in session.statuses() if each.state == "captured"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dsl_core.campaign.recipes import _build, _value, load_recipe, recipe_names
+from dsl_core.campaign.spectralon.recipe import SpectralonRecipe
 from dsl_core.errors import CalibrationError
 from tests.cases.fake_recipe import FakeRecipe
 
@@ -69,6 +70,26 @@ def test_settings_are_read_from_text() -> None:
     assert built == FakeRecipe(keys=("day",), scale=3.0, bad_steps={"day"})
     assert _build(kind, "fake", {"keys": "a,b"}).keys == ("a", "b")
     assert _build(kind, "fake", {"keys": ""}).keys == ()
+    assert _build(kind, "fake", {"keys": "none", "scale": ""}) == FakeRecipe()
     assert _value("430:460:15") == [430.0, 445.0, 460.0]
     with pytest.raises(CalibrationError, match="A setting of fake is wrong: scale must be a number"):
         _build(kind, "fake", {"scale": "large"})
+
+
+@pytest.mark.parametrize("text", ["20261130", "white, 2026", "SRS-99,2020.csv", "0.99", "[1]", "430:450:10"])
+def test_names_of_files_are_no_numbers_or_lists(text: str) -> None:
+    assert load_recipe("spectralon", {"emission_folder": text}) == SpectralonRecipe(emission_folder=text)
+
+
+@pytest.mark.parametrize("text", ["none", ""])
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [("color-checker", "corners_px"), ("bandpass", "depth_mm"), ("spectralon", "reflectance")],
+)
+def test_a_setting_is_taken_back_by_none(name: str, key: str, text: str) -> None:
+    assert load_recipe(name, {key: text}) == load_recipe(name)
+
+
+def test_a_decimal_comma_is_told_as_one() -> None:
+    with pytest.raises(CalibrationError, match=r"a decimal point, such as 0\.99 \(given 0,99\)"):
+        load_recipe("spectralon", {"reflectance": "0,99"})

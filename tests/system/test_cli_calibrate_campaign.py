@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 from dsl_core.campaign import recipes
+from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.devices import registry
 from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.folder import ScanReader
@@ -190,6 +192,23 @@ def test_steps_are_captured_anew_on_request(give: Give, tmp_path: Path) -> None:
     assert "Replaced calibrations" not in (folder / "report.html").read_text()
     assert give("calibrate", "all", folder, "--yes").code == 0
     assert "Replaced calibrations" in (folder / "report.html").read_text()
+
+
+def test_a_setting_that_the_devices_refuse_is_not_kept(
+    give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, steps = tmp_path / "campaign", fake_recipe.FakeRecipe.steps
+
+    def within_reach(recipe: fake_recipe.FakeRecipe, bench: Bench) -> tuple[Step, ...]:
+        if recipe.scale > 100:
+            raise CalibrationError("The stage does not reach there.")
+        return steps(recipe, bench)
+
+    monkeypatch.setattr(fake_recipe.FakeRecipe, "steps", within_reach)
+    refused = give("selftest", folder, *TWIN, "--yes", "--set", "scale=200")
+    assert refused.code != 0
+    assert "does not reach there" in refused.sentence
+    assert give("selftest", folder, *TWIN, "--yes").code == 0
 
 
 def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:
