@@ -7,6 +7,7 @@ by the reflectance of the Spectralon.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,9 @@ _LEDS: tuple[LightColour, ...] = ("red", "green", "blue")
 #: Correlation lengths (nm) and scales that are tried.
 LENGTHS_NM = np.geomspace(5.0, 160.0, 14)
 SCALES = (0.5, 1.0, 2.0, 4.0)
+#: Steps in which a curve is told where values are farther apart, and the largest step of values that tells
+#: the peak of an LED, nm.
+FINE_NM, MOST_STEP_NM = 1.0, 10.0
 #: Half width (nm) of the envelope's maximum and blur, and its least value as a share of the peak.
 ENVELOPE_NM, ENVELOPE_FLOOR = 6.0, 1e-3
 
@@ -48,6 +52,11 @@ def measured_emission(readings: EmissionReadings, reflectance: SpectralCurve) ->
             f"The spectrum under {' and '.join(missing)} is missing. Measure all of {', '.join(COLOURS)}."
         )
     nm = np.array(readings.readings["white"][0].wavelengths_nm)
+    if float(np.diff(nm).max()) > 1.01 * MOST_STEP_NM:
+        raise CalibrationError(
+            f"The spectra have values up to {np.diff(nm).max():g} nm apart, which is too coarse for the peaks"
+            f" of LEDs. Export them from the instrument every {MOST_STEP_NM:g} nm or finer."
+        )
     require_repeats(readings)
     mean, variance = _means(readings, nm)
     leds = np.stack([mean[c] - mean["black"] for c in _LEDS]) / reflectance.at(nm)
@@ -112,10 +121,13 @@ def _with_white(
 def _smoothed(
     nm: Floats, leds: Floats, std: Floats, additivity: tuple[float, float], count: int
 ) -> MeasuredEmission:
-    smooth = [smooth_curve(nm, value, noise) for value, noise in zip(leds, std, strict=True)]
-    scale = EMISSION_SUM_NM / float((sum(s.values for s in smooth) * np.gradient(nm)).sum())
+    # Between values that are far apart a curve is no straight line.
+    coarse = float(np.diff(nm).max()) > 1.01 * FINE_NM
+    fine = np.linspace(nm[0], nm[-1], 1 + math.ceil((nm[-1] - nm[0]) / FINE_NM)) if coarse else nm
+    smooth = [smooth_curve(nm, value, noise, fine) for value, noise in zip(leds, std, strict=True)]
+    scale = EMISSION_SUM_NM / float((sum(s.values for s in smooth) * np.gradient(fine)).sum())
     # Negative emission does not exist; what noise leaves below zero is far within its deviation.
-    red, green, blue = (SpectralCurve.of(nm, (scale * s.values).clip(0), std=scale * s.std) for s in smooth)
+    red, green, blue = (SpectralCurve.of(fine, (scale * s.values).clip(0), std=scale * s.std) for s in smooth)
     ends = max(max(curve.values[0], curve.values[-1]) / max(curve.values) for curve in (red, green, blue))
     first, second, third = (s.length_nm for s in smooth)
     return MeasuredEmission(
@@ -155,10 +167,14 @@ class SmoothCurve:
     length_nm: float
 
 
-def smooth_curve(wavelengths_nm: Floats, values: Floats, std: Floats) -> SmoothCurve:
+def smooth_curve(
+    wavelengths_nm: Floats, values: Floats, std: Floats, at_nm: Floats | None = None
+) -> SmoothCurve:
     """The most likely smooth curve behind values with independent noise of known deviation.
 
-    All of shape (wavelengths,); values in any unit. Not clipped at zero: that would bias dark wings.
+    All of shape (wavelengths,); values in any unit. The curve is that at other wavelengths ``at_nm`` if they
+    are given: between values it is as unsure as they leave it. Not clipped at zero: that would bias dark
+    wings.
     """
     from scipy.linalg import cho_solve
 
@@ -166,7 +182,7 @@ def smooth_curve(wavelengths_nm: Floats, values: Floats, std: Floats) -> SmoothC
     y, noise = values / peak, np.maximum(std / peak, 1e-9)
     envelope = _envelope(wavelengths_nm, y, noise)
     distance = np.abs(wavelengths_nm[:, None] - wavelengths_nm)
-    best = (-np.inf, 0.0, np.empty(0))
+    best = (-np.inf, 0.0, 1.0)
     for length in LENGTHS_NM:
         shape = _matern(distance / length) * np.outer(envelope, envelope)
         for scale in SCALES:
@@ -174,11 +190,17 @@ def smooth_curve(wavelengths_nm: Floats, values: Floats, std: Floats) -> SmoothC
             factor = np.linalg.cholesky(scale**2 * shape + np.diag(noise**2)), True
             evidence = -0.5 * y @ cho_solve(factor, y) - np.log(np.diag(factor[0])).sum()
             if evidence > best[0]:
-                best = (float(evidence), float(length), scale**2 * shape)
-    _, length_nm, prior = best
-    solved = np.linalg.solve(prior + np.diag(noise**2), np.column_stack([y, prior]))
-    mean = prior @ solved[:, 0]
-    spread = np.diag(prior) - np.einsum("ij,ij->j", prior, solved[:, 1:])
+                best = (float(evidence), float(length), scale)
+    _, length_nm, scale = best
+    at = wavelengths_nm if at_nm is None else at_nm
+    at_envelope = np.interp(at, wavelengths_nm, envelope)
+    prior, across = (
+        scale**2 * _matern(np.abs(each[:, None] - wavelengths_nm) / length_nm) * np.outer(size, envelope)
+        for each, size in ((wavelengths_nm, envelope), (at, at_envelope))
+    )
+    solved = np.linalg.solve(prior + np.diag(noise**2), np.column_stack([y, across.T]))
+    mean = across @ solved[:, 0]
+    spread = (scale * at_envelope) ** 2 - np.einsum("ij,ji->i", across, solved[:, 1:])
     return SmoothCurve(mean * peak, np.sqrt(np.maximum(spread, 0)) * peak, length_nm)
 
 

@@ -37,15 +37,15 @@ LIGHT: dict[LightColour, tuple[int, int, int]] = {
 }  # fmt: skip
 
 
-def readings(noise: float = 0.002, count: int = 8, seed: int = 0) -> EmissionReadings:
+def readings(noise: float = 0.002, count: int = 8, seed: int = 0, nm: np.ndarray = NM) -> EmissionReadings:
     """Spectra as an instrument with noise would read them, other light of the room included."""
     rng = np.random.default_rng(seed)
-    leds = np.stack([curve.at(NM) for curve in published_rig().emission]) * WHITE.at(NM)
+    leds = np.stack([curve.at(nm) for curve in published_rig().emission]) * WHITE.at(nm)
     made: dict[LightColour, tuple[SpectralCurve, ...]] = {}
     for colour in COLOURS:
         value = np.array(LIGHT[colour]) @ leds + 0.01
         made[colour] = tuple(
-            SpectralCurve.of(NM, 3e-3 * (value + noise * value.max() * rng.standard_normal(NM.size)))
+            SpectralCurve.of(nm, 3e-3 * (value + noise * value.max() * rng.standard_normal(nm.size)))
             for _ in range(count)
         )
     return EmissionReadings(source="test", readings=made)
@@ -71,6 +71,25 @@ def test_emission_is_right_within_its_deviation() -> None:
     peaks = [int(led.argmax()) for led in scaled_truth()]
     for led, peak in enumerate(peaks):
         assert abs(error[:, led, peak].mean()) < 2.5 * std[:, led, peak].mean()
+
+
+@pytest.mark.parametrize(("step_nm", "most"), [(5.0, 0.003), (10.0, 0.009)])
+def test_between_values_that_are_far_apart_a_curve_is_smooth_and_as_unsure_as_it_is(
+    step_nm: float, most: float
+) -> None:
+    nm = np.arange(400.0, 701.0, step_nm)
+    found = measured_emission(readings(nm=nm), WHITE)
+    truth = scaled_truth()
+    fitted = np.stack([curve.at(NM) for curve in found.curves])
+    error = fitted * (fitted * truth).sum() / (fitted**2).sum() - truth
+    std = np.stack([np.interp(NM, curve.wavelengths_nm, np.array(curve.std)) for curve in found.curves])
+    assert np.sqrt((error**2).mean()) < most * truth.max()
+    assert np.mean(np.abs(error) < 2 * std) > 0.88
+
+
+def test_values_too_far_apart_for_a_peak_are_refused() -> None:
+    with pytest.raises(CalibrationError, match="up to 20 nm apart"):
+        measured_emission(readings(nm=np.arange(400.0, 701.0, 20.0)), WHITE)
 
 
 def test_a_single_reading_knows_its_noise() -> None:
@@ -242,7 +261,7 @@ def test_curves_share_a_scale_and_what_is_left_at_their_ends_is_told(monkeypatch
     leds[0, 5:15], leds[1, 5:15], leds[2, 5:15] = 2.0, 3.0, 5.0
     leds[0, 0], leds[1, -1], leds[1, 1], leds[2, 3] = 0.2, 0.6, 3.0, -1.0
 
-    def same(wavelengths: np.ndarray, values: np.ndarray, std: np.ndarray) -> SmoothCurve:
+    def same(_nm: np.ndarray, values: np.ndarray, std: np.ndarray, _at_nm: np.ndarray) -> SmoothCurve:
         return SmoothCurve(values, std, 10 * values.max())
 
     monkeypatch.setattr("dsl_core.calibration.light.emission.smooth_curve", same)
