@@ -14,6 +14,7 @@ from dsl_core.calibration.orders.efficiency import (
     EfficiencyFit,
     RatioSample,
     fit_efficiency,
+    require_both_orders,
     second_order_curve,
     second_order_share,
 )
@@ -120,17 +121,16 @@ def fit_bandpass(
     placed = [_placed(each, passed(rig, each.transmission, middle)) for each in filters]
     found = found_wavelengths(rig, placed)
     warnings = _check(rig, filters, placed, found)
-    fits = {
-        order: fit_efficiency(
+    samples = {
+        order: _ratios(
             order,
-            _ratios(
-                order,
-                filters,
-                [passed(rig, each.transmission, shift, each.light.orders[order].cells) for each in filters],
-            ),
+            filters,
+            [passed(rig, each.transmission, shift, each.light.orders[order].cells) for each in filters],
         )
         for order in ORDERS
     }
+    require_both_orders(samples)
+    fits = {order: fit_efficiency(order, samples[order]) for order in ORDERS}
     share, share_std = second_order_share(_second(filters, lights, fits))
     white, white_std = _white(rig, profile_scan(scan), profile)
     bands = [

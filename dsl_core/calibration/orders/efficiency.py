@@ -8,7 +8,7 @@ where few filters say nothing of it; the means are linearised around the curve i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,9 +57,26 @@ class EfficiencyFit:
     misfit: float
 
 
+def require_both_orders(samples: Mapping[int, Sequence[RatioSample]]) -> None:
+    """Raise `CalibrationError` where filters show one first order well and the other not at all."""
+    seen = {order: len(_usable(each)) for order, each in samples.items()}
+    for order, count in seen.items():
+        if count == 0 and seen[-order] >= MIN_SAMPLES:
+            raise CalibrationError(
+                f"Order {order:+d} was found through none of the filters, order {-order:+d} through"
+                f" {seen[-order]}: the film sends no light into order {order:+d}, or sends it beyond the"
+                " projector's frame. Calibration needs both first orders. Use a film that has them, or place"
+                " the target in the middle of the projected picture."
+            )
+
+
+def _usable(samples: Sequence[RatioSample]) -> list[RatioSample]:
+    return [each for each in samples if np.isfinite(each.std) and each.ratio > STANDS_OUT * each.std]
+
+
 def fit_efficiency(order: int, samples: Sequence[RatioSample]) -> EfficiencyFit:
     """Smooth efficiency of one order; raises `CalibrationError` with fewer than two usable samples."""
-    used = [s for s in samples if np.isfinite(s.std) and s.ratio > STANDS_OUT * s.std]
+    used = _usable(samples)
     if len({round(_centre(s)) for s in used}) < MIN_SAMPLES:
         raise CalibrationError(
             f"Order {order:+d} was found through {len(used)} filters; {MIN_SAMPLES} of different wavelengths"

@@ -10,6 +10,7 @@ import pytest
 from dsl_core.calibration.orders.efficiency import (
     RatioSample,
     fit_efficiency,
+    require_both_orders,
     second_order_curve,
     second_order_share,
 )
@@ -85,6 +86,16 @@ def test_scatter_beyond_the_stated_noise_is_noticed() -> None:
 def test_one_filter_is_not_enough() -> None:
     with pytest.raises(CalibrationError, match=r"Order \+1 was found through 3 filters"):
         fit_efficiency(1, samples(1, 0, range(500, 501)))
+
+
+def test_a_film_of_one_order_is_told_as_one() -> None:
+    seen = samples(1, 0, range(430, 661, 40))
+    nothing = [RatioSample(0.0, 1e-3, each.light) for each in seen]
+    require_both_orders({1: seen, -1: seen})
+    require_both_orders({1: nothing, -1: nothing})
+    told = r"Order -1 was found through none of the filters, order \+1 through \d+: the film sends no light"
+    with pytest.raises(CalibrationError, match=told):
+        require_both_orders({1: seen, -1: nothing})
 
 
 def test_second_orders_are_a_share_of_the_first_and_may_be_unknown() -> None:
