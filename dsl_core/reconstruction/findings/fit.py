@@ -16,6 +16,7 @@ from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
 from dsl_core.reconstruction.findings.band_findings import band_findings, line_width_nm
 from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share_findings
 from dsl_core.reconstruction.findings.known_causes import (
+    with_finer_bands_first,
     without_drift_that_is_none,
     without_misfit_of_wide_bands,
 )
@@ -55,7 +56,7 @@ def fit_of(
         findings += without_drift_that_is_none(of_model, [*findings])
     turn = None if followed is None else followed.turn
     common = [rig.white_scale_rel_std, rig.reference_rel_std, 0.0 if turn is None else turn.level_rel_std]
-    findings = without_misfit_of_wide_bands(findings)
+    findings = with_finer_bands_first(without_misfit_of_wide_bands(findings), grid.step_nm)
     fit = Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
     fit = fit.model_copy(update={"common_rel_std": float(np.linalg.norm(common))})
     if followed is None or not followed.has_changed:

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dsl_core.model.fit import FitFinding
+from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.findings.band_findings import WIDE_BANDS
 from dsl_core.reconstruction.findings.flag_findings import POOR_AREAS, POOR_FIT
 from dsl_core.reconstruction.findings.model_findings import (
     COLOUR_GAINS,
     COLOURS_DISAGREE,
     DRIFT_LEFT,
+    GAIN_OF_BOTH,
     MISFIT,
+    ORDERS_APART,
 )
 from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
@@ -56,6 +59,27 @@ def without_misfit_of_wide_bands(findings: Iterable[FitFinding]) -> list[FitFind
     return [
         each.model_copy(update={"significant": False}) if each.name in BY_WIDE_BANDS else each
         for each in found
+    ]
+
+
+def with_finer_bands_first(findings: Iterable[FitFinding], step_nm: float) -> list[FitFinding]:
+    """The same findings, where bands of ``step_nm`` are wider than usual and may be all that does not fit.
+
+    Straight pieces that are too long for a spectrum look like a fault of the rig, which nobody should look
+    for before.
+    """
+    usual_nm = WavelengthGrid().step_nm
+    if step_nm <= usual_nm:
+        return list(findings)
+    first = (
+        f"Reconstruct with bands of {usual_nm:g} nm first: ones of {step_nm:g} nm may be too wide for these"
+        " spectra. If it stays: "
+    )
+    return [
+        each.model_copy(update={"advice": first + each.advice[0].lower() + each.advice[1:]})
+        if each.significant and each.name in BY_WIDE_BANDS | {GAIN_OF_BOTH, ORDERS_APART}
+        else each
+        for each in findings
     ]
 
 

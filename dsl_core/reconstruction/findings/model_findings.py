@@ -25,8 +25,9 @@ from dsl_core.reconstruction.spectral.probing.probe import Probe
 from dsl_core.reconstruction.spectral.turned import Turn
 from dsl_core.solve.normal import BAND_95
 
-#: Name of what is found of the light of both orders.
+#: Names of what is found of the light of both orders, and of one against the other.
 GAIN_OF_BOTH = "gain of both orders against the zero order"
+ORDERS_APART = "difference between the gains of the orders"
 #: With less light of both first orders than this, relative to what is expected, there is no film.
 WITHOUT_FILM = -0.7
 #: Blur and tail of the lines below which neither is worth a finding.
@@ -325,7 +326,7 @@ def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
     common = causes.common_gain
     yield FitFinding.judged(
         "orders",
-        "difference between the gains of the orders",
+        ORDERS_APART,
         (float(plus - minus), causes.difference_std),
         "1",
         MOST_GAIN,

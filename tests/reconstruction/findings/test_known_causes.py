@@ -8,6 +8,7 @@ from dsl_core.model.fit import Fit, FitFinding
 from dsl_core.reconstruction.findings.band_findings import band_findings
 from dsl_core.reconstruction.findings.flag_findings import POOR_AREAS, POOR_FIT, SpectralCounts
 from dsl_core.reconstruction.findings.known_causes import (
+    with_finer_bands_first,
     with_known_causes,
     without_drift_that_is_none,
     without_misfit_of_wide_bands,
@@ -16,7 +17,9 @@ from dsl_core.reconstruction.findings.model_findings import (
     COLOUR_GAINS,
     COLOURS_DISAGREE,
     DRIFT_LEFT,
+    GAIN_OF_BOTH,
     MISFIT,
+    ORDERS_APART,
 )
 from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
@@ -64,3 +67,14 @@ def test_bands_too_wide_for_the_lines_are_told_alone(name: str, step_nm: float, 
     assert ("coarse for lines" in fit.words) == (not is_told)
     assert "The light has changed." in fit.words, "no width of bands makes light drift"
     assert {each.name for each in fit.findings} >= {name}
+
+
+@pytest.mark.parametrize("name", [POOR_AREAS, MISFIT, GAIN_OF_BOTH, ORDERS_APART, DRIFT_LEFT])
+@pytest.mark.parametrize("step_nm", [5.0, 10.0])
+def test_before_a_rig_is_blamed_bands_are_made_finer(name: str, step_nm: float) -> None:
+    """Narrow features in wide bands were told as dirt on the film, and as a response to be measured again."""
+    found = with_finer_bands_first([finding(name, 0.98, "It differs.")], step_nm)
+    first = step_nm == 10 and name != DRIFT_LEFT
+    assert found[0].advice.startswith("Reconstruct with bands of 5 nm first: ones of 10 nm") == first
+    assert found[0].advice.endswith("If it stays: do it." if first else "Do it.")
+    assert found[0].significant
