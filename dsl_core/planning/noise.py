@@ -68,6 +68,34 @@ class Bracket:
         gains = torch.tensor(self.gains_ms).to(radiance)
         return share / gains.reshape(-1, *(1,) * radiance.ndim)
 
+    @property
+    def unrounded(self) -> Bracket:
+        """The bracket of a sensor of the same noise that rounds nothing."""
+        sensor = self.sensor.model_copy(update={"step_dn": 1e-6})
+        return Bracket(self.gains_ms, self.exposures_ms, sensor)
+
+    def rounding(self, radiance: Tensor, black: Tensor) -> Tensor:
+        """What rounding of raw values adds to the merged radiance on average over noise, same shape.
+
+        It is the same in every frame and pixel of equal light: no mean takes it out. Noise of a third of a
+        step does, as the first term of the mean of rounded normal values has it.
+        """
+        errors = []
+        for gain, exposure_ms in zip(self.gains_ms, self.exposures_ms, strict=True):
+            black_dn = black * exposure_ms
+            raw_dn = (radiance * gain).clip(min=0) + black_dn
+            errors.append(self._rounded_off(raw_dn) - self._rounded_off(black_dn))
+        error: Tensor = (self.black_weights(radiance, black) * torch.stack(errors)).sum(0)
+        return error
+
+    def _rounded_off(self, light_dn: Tensor) -> Tensor:
+        step_dn = self.sensor.step_dn
+        steps = (light_dn + self.sensor.black_level_dn) / step_dn
+        # The floor holds the variance of rounding itself, which carries no light across steps.
+        variance = self._floor(light_dn) / step_dn**2 - 1 / 12
+        error: Tensor = (steps.round() - steps) * step_dn * (-2 * torch.pi**2 * variance.clip(min=0)).exp()
+        return error
+
 
 def demosaic_factors(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
     """Variance of each colour at pixels relative to that of a sample of the mosaic, (pixels, 3).

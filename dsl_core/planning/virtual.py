@@ -92,7 +92,8 @@ class Draw:
     ``nodes`` (samples, spectra, bands) are the true spectra, ``first`` and ``zero`` the signals without
     noise, ``black`` (one frame) the projector's black light; ``noisy`` is what is read, with the stated
     ``variance`` of its mosaic; ``black_noise`` is what the black frames' noise adds to it, whose variance,
-    common to all frames, is ``offset_variance`` (samples, spectra, 3); more is drawn from ``random``.
+    common to all frames, is ``offset_variance`` (samples, spectra, 3); ``rounding`` is what a coarse sensor
+    adds to all pixels of equal light; more is drawn from ``random``.
     """
 
     nodes: Tensor
@@ -104,6 +105,7 @@ class Draw:
     saturated: Tensor
     black_noise: Tensor
     offset_variance: Tensor
+    rounding: Tensor
     random: torch.Generator
 
     def normal(self, shape: torch.Size | tuple[int, ...]) -> Tensor:
@@ -215,10 +217,10 @@ class VirtualPixels:
         depth_error = error_px.double() * self.slope_mm[:, None]
         # Of what the reconstruction grants its linear model as error, what scatters is drawn as well.
         base = draw.noisy + self.scatter * MODEL_ERROR * draw.noisy * draw.normal(draw.noisy.shape)
-        clean = draw.first + draw.zero
+        clean = draw.first + draw.zero + draw.rounding
         if self.model.single:
             # Zero order and halo are subtracted; the unlit frames between the orders give the dark offset.
-            base, clean = base - draw.zero - (draw.black_noise if self.has_unlit else 0.0), draw.first
+            base, clean = base - draw.zero - (draw.black_noise if self.has_unlit else 0.0), clean - draw.zero
         amplitude = column.amplitude_std.reshape(error_px.shape)
         found, calm = self._solve(draw, base, clean, error_px, amplitude)
         scale = 1 / (1 + self._shading_error(draw, column, depth_error))
@@ -240,17 +242,25 @@ class VirtualPixels:
         nodes, clean = like(spectra, self.shading), first + zero
         fraction = self.rig.projector_response.black_fraction
         black = fraction * self._white(nodes, (0, *ORDERS))[..., None]
+        rounding = torch.zeros(())
         spread = self.bracket.variance(clean, black) * self.factors
+        if self.rig.sensor.rounds_light:
+            # Neighbours of a pixel see other parts of a line, and are rounded otherwise.
+            rounding = self.bracket.rounding(clean, black) * self.factors.sqrt()
+            spread = self.bracket.unrounded.variance(clean, black) * self.factors
         saturated = ~torch.isfinite(spread)
         noise = torch.randn(clean.shape, generator=random) * torch.where(saturated, 0.0, spread).sqrt()
         weights, floors = self.bracket.black_weights(clean, black), self.bracket.floors(black)
         # The noise of the black frames is common to all frames of a pixel.
         common = torch.randn(floors.shape, generator=random) * (floors * self.factors).sqrt()
         black_noise = -(weights * common).sum(0)
-        noisy = clean + noise + black_noise
+        noisy = clean + rounding + noise + black_noise
         dark = self.bracket.variance(torch.zeros_like(black), black) * self.factors
         variance = self.bracket.variance(noisy, black)
-        return Draw(nodes, first, zero, black, noisy, variance, saturated, black_noise, dark[..., 0], random)
+        offset = dark[..., 0]
+        return Draw(
+            nodes, first, zero, black, noisy, variance, saturated, black_noise, offset, rounding, random
+        )  # fmt: skip
 
     def _columns(self, draw: Draw) -> tuple[Column, Tensor]:
         """Refined columns of all virtual pixels from their own samples of the mosaic, and their errors.

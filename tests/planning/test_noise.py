@@ -82,3 +82,20 @@ def test_a_prediction_without_a_mosaic_takes_no_copies_for_measurements() -> Non
         predict(without_mosaic(small_rig(), red), plan, peaks=False).pixel_rmse for red in (1.0, 0.0)
     )
     assert copied == pytest.approx(blind, rel=1e-3)
+
+
+@pytest.mark.parametrize(("read_noise_dn", "remains"), [(0.01, 1.0), (0.4, 0.05)])
+def test_rounding_is_what_means_of_rounded_values_are_off_by(read_noise_dn: float, remains: float) -> None:
+    """Noise carries light across steps; without it, no mean of many values is right."""
+    rig, rng = small_rig(), np.random.default_rng(2)
+    sensor = rig.sensor.model_copy(
+        update={"read_noise_dn": read_noise_dn, "electrons_per_dn": 1e6, "black_level_dn": 16.3}
+    )
+    bracket = Bracket((2.0,), (3.0,), sensor)
+    radiance, black = torch.linspace(0.0, 2.0, 33, dtype=torch.float64), torch.full((33,), 0.03)
+    said = bracket.rounding(radiance, black.double()).numpy()
+    raw = 16.3 + 0.09 + 2.0 * radiance.numpy()
+    noisy, dark = (each + read_noise_dn * rng.standard_normal((4000, 33)) for each in (raw, 16.39))
+    true = (np.rint(noisy).mean(0) - raw - np.rint(dark).mean(0) + 16.39) / 2.0
+    assert said == pytest.approx(true, abs=0.05)
+    assert np.abs(said).max() < 0.5 * remains
