@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ import xarray as xr
 
 from dsl_core.errors import StoreError
 from dsl_core.io.describe import describe
+from dsl_core.io.result.result_arrays import load_arrays
 from dsl_core.io.result.result_file import has_checksums, load_result, save_result
+from dsl_core.progress import CallbackProgress, CancelToken
 from tests.cases.small_result import small_result
 
 
@@ -78,6 +81,54 @@ def test_an_array_that_was_added_is_told(copied: Path) -> None:
     shutil.copytree(copied / "depth_mm", copied / "more")
     with pytest.raises(StoreError, match=r"more/zarr\.json was added"):
         load_result(copied)
+
+
+def _move(folder: Path) -> None:
+    folder.rename(folder.with_name("moved.zarr"))
+
+
+def _replace(folder: Path) -> None:
+    other = small_result()
+    save_result(other.assign(reflectance=other["reflectance"] * 0.5), folder, overwrite=True)
+
+
+def _replace_by_fewer_rows(folder: Path) -> None:
+    save_result(small_result().isel(y=slice(0, 4)), folder, overwrite=True)
+
+
+def _lose_a_chunk(folder: Path) -> None:
+    (folder / "reflectance" / "c" / "0" / "0" / "0").unlink()
+
+
+@pytest.mark.parametrize("change", [_move, shutil.rmtree, _replace, _replace_by_fewer_rows, _lose_a_chunk])
+def test_a_result_that_is_no_longer_the_one_opened_is_told_when_it_is_read(
+    copied: Path, change: Callable[[Path], None]
+) -> None:
+    lazy = load_result(copied)
+    change(copied)
+    with pytest.raises(StoreError, match=r"a\.zarr was moved, removed or replaced since it was opened"):
+        lazy["reflectance"].sel(x=3, y=2).load()
+    with pytest.raises(StoreError, match="Load it again from where it is now"):
+        save_result(lazy, copied.with_name("again.zarr"))
+
+
+def test_a_drive_that_goes_while_all_is_read_is_told(copied: Path) -> None:
+    def report(_: str, done: int, __: int) -> None:
+        if done == 3:
+            _move(copied)
+
+    with pytest.raises(StoreError, match="was moved, removed or replaced"):
+        load_arrays(copied, CallbackProgress(report, CancelToken()))
+
+
+def test_a_result_is_read_by_a_script_that_changes_its_folder(
+    copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(copied.parent)
+    lazy = load_result(Path(copied.name))
+    (copied.parent / "elsewhere").mkdir()
+    monkeypatch.chdir("elsewhere")
+    xr.testing.assert_identical(lazy.load(), load_result(copied, lazy=False))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes have no place in folders there")
