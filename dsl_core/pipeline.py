@@ -82,7 +82,8 @@ def open_scan(
     require_possible(rig, plan)
     expected = {} if rig.expect is None else rig.expect(plan)
     with ScanWriter.open(folder, plan, rig, {**(notes or {}), **expected}) as writer:
-        stored, watches = ScanReader(folder), ScanWatches.of(rig, plan, prove)
+        stored = ScanReader(folder)
+        watches = ScanWatches.of(rig, plan, prove, metering.WHITE_MEASURED in stored.manifest.notes)
         watches.learn(writer, stored)
         sink = watches.over(WatchedSink(writer, watch) if watch else writer)
         known = stored.calibration

@@ -40,6 +40,8 @@ ENOUGH = 0.1
 #: A saturated picture says only that it is too bright: the next is exposed for this much less.
 _SHORTEN = 8.0
 _MOST_FRAMES = 4
+#: Note of a scan: what white reached before it began, and what was done to exposures.
+WHITE_MEASURED = "exposures"
 #: Note of a scan: what its white contradicts of the calibration, measured before the scan began.
 WHITE_IN_DOUBT = "white_in_doubt"
 
@@ -60,7 +62,7 @@ class Metered:
     @property
     def notes(self) -> dict[str, str]:
         """What a scan's manifest says of it; a doubt on its own, as its result repeats it."""
-        notes = {"exposures": self.sentence} if self.sentence else {}
+        notes = {WHITE_MEASURED: self.sentence} if self.sentence else {}
         return notes | ({WHITE_IN_DOUBT: self.doubt} if self.doubt else {})
 
 

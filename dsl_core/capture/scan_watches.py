@@ -20,17 +20,20 @@ from dsl_core.model.plan import CapturePlan, Shot
 
 @dataclass(frozen=True)
 class ScanWatches:
-    """Exposure always; pictures, motion and a little of each frame only where a scan is to be proved."""
+    """Exposure, unless white was measured before; the rest only where a scan is to be proved.
 
-    exposure: ExposureWatch
+    Measured white says more: exposures matched to it let it saturate where lines, which are darker, do not.
+    """
+
+    exposure: ExposureWatch | None = None
     proof: FrameProof | None = None
     sentinels: SentinelWatch | None = None
     seen: SeenFrames | None = None
 
     @classmethod
-    def of(cls, rig: DeviceRig, plan: CapturePlan, prove: bool) -> ScanWatches:
+    def of(cls, rig: DeviceRig, plan: CapturePlan, prove: bool, is_metered: bool) -> ScanWatches:
         """Watches for a scan of which they have seen nothing yet."""
-        exposure = ExposureWatch(plan, full_scale_dn(rig))
+        exposure = None if is_metered else ExposureWatch(plan, full_scale_dn(rig))
         if not prove:
             return cls(exposure)
         camera, sensor = rig.camera.info, rig.calibration.sensor if rig.calibration else None
@@ -46,7 +49,7 @@ class ScanWatches:
 
     def over(self, sink: FrameSink) -> FrameSink:
         """The sink, shown to all of them."""
-        looks = [self.exposure.add]
+        looks = [] if self.exposure is None else [self.exposure.add]
         looks += [] if self.sentinels is None else [self.sentinels.add]
         looks += [] if self.seen is None else [self.seen.keep]
         for look in looks:

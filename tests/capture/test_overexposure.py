@@ -10,7 +10,7 @@ import pytest
 from dsl_core.capture.overexposure import MOST_OVEREXPOSED, ExposureWatch
 from dsl_core.capture.runner import Status
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
-from dsl_core.pipeline import open_scan, scan
+from dsl_core.pipeline import meter, open_scan, scan
 from dsl_core.simulation.sim_devices import open_twin
 
 PLAN = CapturePlan(
@@ -82,3 +82,20 @@ def test_a_scan_tells_it_once_and_ends_as_usual(tmp_path, caplog) -> None:  # ty
     assert before[-1].role == "white", "it is told at once"
     darker = plan.model_copy(update={"settings": (Setting(exposure_ms=1000 / 6, level=0.2),)})
     assert scan(rig, darker, tmp_path / "b.dsl").overexposed == ""
+
+
+def test_exposures_that_were_matched_to_the_scene_are_not_called_too_long(tmp_path, caplog) -> None:  # type: ignore[no-untyped-def]
+    """They let white saturate as far as lines, which have less light, do not."""
+    rig = open_twin({"size": "48x32", "scene": "plane", "depth_mm": 742.1})
+    plan = CapturePlan(
+        code=GrayCode(rows=False),
+        spectral=ScanLines(width_px=40, step_px=40),
+        settings=(Setting(exposure_ms=1000 / 3, level=0.4),),
+        code_settings=(0,),
+    ).sized(rig.camera.info, rig.projector.info)
+    found = meter(rig, plan)
+    assert "exposures are shortened" in found.sentence
+    with caplog.at_level(logging.WARNING):
+        assert scan(rig, found.plan, tmp_path / "a.dsl", notes=found.notes).overexposed == ""
+    assert "overexposed" not in caplog.text
+    assert "White is overexposed in" in scan(rig, found.plan, tmp_path / "b.dsl").overexposed
