@@ -14,20 +14,16 @@ from dsl_core.reconstruction.calibration_age import light_calibrated
 
 
 def light_check(rig: Rig, figures: Iterable[Figure], checked: str) -> LightCheck | None:
-    """What the figures of a drift check at a time (ISO 8601) say of the light; None if nothing.
-
-    That is so without the Spectralon, and where nobody noted when the light was calibrated.
-    """
+    """What the figures of a drift check at a time (ISO 8601) say of the light; None without Spectralon."""
     by_name = {figure.name: figure for figure in figures}
     # A monochrome camera has one figure for the light of all LEDs together.
     whites = [by_name.get(white_signal(name), by_name.get(white_signal(""))) for name in COLOUR_NAMES]
-    calibrated = light_calibrated(rig)
     red, green, blue = whites
-    if red is None or green is None or blue is None or not calibrated:
+    if red is None or green is None or blue is None:
         return None
     return LightCheck(
         checked=checked,
-        calibrated=calibrated,
+        calibrated=light_calibrated(rig),
         levels=(red.value, green.value, blue.value),
         std=max(figure.std or 0.0 for figure in (red, green, blue)),
     )

@@ -53,16 +53,21 @@ class LightLevel:
 def light_level(rig: Rig, captured: str) -> LightLevel | None:
     """How well the light's level is known in a scan ``captured`` at a time (ISO 8601); None without dates.
 
-    What was measured nearest to the scan counts, before or after it.
+    What was measured nearest to the scan counts, before or after it: a check also where nobody noted when the
+    light was calibrated.
     """
     scanned, calibrated = _time(captured), _time(light_calibrated(rig))
-    if scanned is None or calibrated is None:
+    if scanned is None:
         return None
-    ages: list[tuple[timedelta, LightCheck | None]] = [(abs(scanned - calibrated), None)]
+    ages: list[tuple[timedelta, LightCheck | None]] = []
+    if calibrated is not None:
+        ages.append((abs(scanned - calibrated), None))
     for check in rig.light_checks:
         checked = _time(check.checked)
         if checked is not None and _time(check.calibrated) == calibrated:
             ages.append((abs(scanned - checked), check))
+    if not ages:
+        return None
     # Where both are as near, a check was made after the calibration, to see what had become of it.
     age, nearest = min(ages, key=lambda each: (each[0], each[1] is None))
     days = age / timedelta(days=1)
@@ -123,6 +128,8 @@ def wander_per_root_day(checks: tuple[LightCheck, ...]) -> float:
         mine = [(_time(c.checked), c) for c in checks if c.calibrated == calibrated]
         known = sorted(((time, c) for time, c in mine if time is not None), key=lambda each: each[0])
         before, start = LightCheck(checked="", calibrated="", levels=(1.0, 1.0, 1.0)), _time(calibrated)
+        if start is None and known:  # how old the light was at the first check is unknown
+            start, before = known[0]
         for time, check in known:
             if start is not None and (days := (time - start) / timedelta(days=1)) >= LEAST_DAYS:
                 change = np.subtract(check.levels, before.levels)

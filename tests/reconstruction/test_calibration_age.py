@@ -133,6 +133,23 @@ def test_checks_of_long_ago_are_told_with_their_age() -> None:
     assert "The light was last checked 16 days before this scan" in unseen_since(rig, SCANNED)
 
 
+def test_without_a_date_of_the_calibration_checks_tell_of_the_light_by_themselves() -> None:
+    first, last = (checked(f"2026-03-{day}T10:00:00+00:00", 0.95, calibrated="") for day in ("10", "14"))
+    rig = rig_of("").model_copy(update={"light_checks": (first, last)})
+    level = light_level(rig, SCANNED)
+    assert level is not None
+    assert (level.days, level.check) == (8, last)
+    assert light_level(rig_of(""), SCANNED) is None
+    # The first says how far off the light is, but not how fast it became so.
+    assert wander_per_root_day((first,)) == pytest.approx(PER_ROOT_DAY)
+    assert wander_per_root_day((first, last)) == pytest.approx(PER_ROOT_DAY * 0.75**0.5)
+    # With a date they are of another calibration.
+    dated = rig_of(THREE_WEEKS).model_copy(update={"light_checks": (first, last)})
+    level = light_level(dated, SCANNED)
+    assert level is not None
+    assert level.check is None
+
+
 def test_a_rig_whose_checks_were_steady_is_trusted_for_longer() -> None:
     steady = tuple(checked(f"2026-03-{day:02d}T10:00:00+00:00", 1.0) for day in (8, 15, 22))
     wanted = PER_ROOT_DAY * (DEFAULT_CHECKS / (DEFAULT_CHECKS + 3)) ** 0.5

@@ -11,7 +11,7 @@ class LightCheck(Record):
     """Light of a known white over that of the calibration, by red, green and blue; one is no change.
 
     ``checked`` is when it was measured and ``calibrated`` when the light that it was compared with was, both
-    ISO 8601; ``std`` is the largest deviation of the three levels.
+    ISO 8601, the latter empty where nobody noted it; ``std`` is the largest deviation of the three levels.
     """
 
     checked: str
