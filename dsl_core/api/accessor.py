@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from dsl_core.api import FilePath
-from dsl_core.api.places import Place, as_array, extent_of, place_mask, require_picture
+from dsl_core.api import FilePath, path_of
+from dsl_core.api.places import Place, as_array, extent_of, place_mask, require_picture, require_result
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.marks import explain_pixel, largest_difference, region_spectrum
 from dsl_core.io.export import export_by_ending
@@ -171,11 +171,11 @@ class ResultAccessor:
         overwrite: bool = False,
     ) -> list[Path]:
         """As `dsl_core.export`."""
-        return export_by_ending(self._result, Path(path), format, pixels=pixels, overwrite=overwrite)
+        return export_by_ending(self._result, path_of(path), format, pixels=pixels, overwrite=overwrite)
 
     def save(self, path: FilePath, *, overwrite: bool = False) -> Path:
         """As `dsl_core.save_result`."""
-        return save_result(self._result, Path(path), overwrite=overwrite)
+        return save_result(self._result, path_of(path), overwrite=overwrite)
 
     def plot(self, x: int | None = None, y: int | None = None, ax: Axes | None = None) -> Axes:
         """Draw a spectrum with its 95 % band, and return the axes.
@@ -243,6 +243,7 @@ def _flags(result: xr.Dataset) -> xr.DataArray:
 
 def _one_spectrum(given: xr.Dataset) -> xr.Dataset:
     """Reflectance and its deviation (bands,) of one spectrum; raises `DecodeError` for anything else."""
-    if "reflectance_std" not in given or given["reflectance"].dims != ("wavelength_nm",):
+    require_result(given)
+    if not {"reflectance", "reflectance_std"} <= set(given) or given["reflectance"].dims != (BANDS,):
         raise DecodeError("A difference is that of two spectra, as spectrum(x, y) and region(...) return.")
     return given[["reflectance", "reflectance_std"]].reset_coords(drop=True)

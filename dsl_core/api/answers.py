@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from dsl_core.api import FilePath
+from dsl_core.api import FilePath, path_of
 from dsl_core.api.places import Place, place_mask, require_picture
 from dsl_core.errors import DecodeError
 from dsl_core.model.attributes import stated_band_width_nm
@@ -60,8 +59,8 @@ def classify(
 
     _require_choice("measure", measure, [each.value for each in Measure])
     _require_choice("brightness", brightness, get_args(Brightness))
-    require_spectra(result)
     require_picture(result)
+    require_spectra(result)
     result = with_axes(result)
     if library is None and not pins:
         raise DecodeError("There is nothing to compare with. Give a library of spectra, pins, or both.")
@@ -71,7 +70,7 @@ def classify(
     notes: list[str] = []
     if library is not None:
         paths = [library] if not isinstance(library, Sequence) or isinstance(library, str) else library
-        read = read_library([Path(path) for path in paths], grouping, progress=progress)
+        read = read_library([path_of(path) for path in paths], grouping, progress=progress)
         nm = result["wavelength_nm"].values
         width_nm = stated_band_width_nm(result.attrs, nm)
         found, left_out = classes_of_library(read, nm, library_error, width_nm)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike, NDArray
 
-from dsl_core.api import FilePath
+from dsl_core.api import FilePath, path_of
 from dsl_core.extras import names_missing_packages
 
 if TYPE_CHECKING:
@@ -114,8 +113,8 @@ def read_spectra(path: FilePath) -> dict[str, xr.DataArray]:
 
     over = "wavelength_nm"
     return {
-        (each.name or Path(path).stem): xr.DataArray(
+        (each.name or path_of(path).stem): xr.DataArray(
             list(each.curve.values), {over: list(each.curve.wavelengths_nm)}, (over,), name="reflectance"
         )
-        for each in read_references(Path(path)).references
+        for each in read_references(path_of(path)).references
     }

@@ -49,8 +49,20 @@ def place_mask(result: xr.Dataset, place: Place, name: str = "The region") -> ND
     return np.asarray(inside_y[:, None] & inside_x)
 
 
+def require_result(given: object) -> None:
+    """Raise `DecodeError` for what is no dataset, such as the path of a result."""
+    import xarray as xr
+
+    if not isinstance(given, xr.Dataset):
+        raise DecodeError(
+            "A result is needed, as reconstruct and load_result return it; what was given is of type"
+            f" {type(given).__name__}."
+        )
+
+
 def require_picture(result: xr.Dataset) -> None:
     """Raise `DecodeError` for what has no rows or no columns, such as one spectrum."""
+    require_result(result)
     lacking = [axis for axis in _AXES if axis not in result.dims]
     if len(lacking) == 2:
         raise DecodeError("This is one spectrum, not a result: it has no pixels to choose from.")

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import dsl_core.api.accessor  # noqa: F401  (registers ``.dsl``)
-from dsl_core.api import FilePath
+from dsl_core.api import FilePath, path_of
+from dsl_core.api.places import require_result
 from dsl_core.extras import names_missing_packages
 from dsl_core.io.export import export_by_ending
 from dsl_core.io.result import result_file
@@ -21,12 +22,13 @@ if TYPE_CHECKING:
 
 def load_result(path: FilePath) -> xr.Dataset:
     """A saved result; bands are read when they are first used. Raises `StoreError`."""
-    return result_file.load_result(Path(path))
+    return result_file.load_result(path_of(path))
 
 
 def save_result(result: xr.Dataset, path: FilePath, *, overwrite: bool = False) -> Path:
     """Store a result as a zarr folder, whole or not at all, and return its path; raises `StoreError`."""
-    return result_file.save_result(result, Path(path), overwrite=overwrite)
+    require_result(result)
+    return result_file.save_result(result, path_of(path), overwrite=overwrite)
 
 
 @names_missing_packages
@@ -45,7 +47,8 @@ def export(
     the picture; what ``result.dsl.spectrum`` and ``result.dsl.region`` return is exported as csv too.
     Raises `StoreError` for an unknown format, an existing file and a disk that fails.
     """
-    return export_by_ending(result, Path(path), format, pixels=pixels, overwrite=overwrite)
+    require_result(result)
+    return export_by_ending(result, path_of(path), format, pixels=pixels, overwrite=overwrite)
 
 
 @names_missing_packages
@@ -57,5 +60,6 @@ def evaluate(result: xr.Dataset) -> Evaluation:
     from dsl_core import pipeline
     from dsl_core.workflows.scans import truth_of
 
+    require_result(result)
     result = canonical(result)
     return pipeline.evaluate(result, truth_of(result))

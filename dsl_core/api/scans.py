@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from dsl_core.api import FilePath
+from dsl_core.api import FilePath, path_of, path_text
 from dsl_core.api.places import as_array, whole_numbers
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import default_options, rig_names
@@ -48,7 +47,7 @@ def open_rig(name: FilePath = "twin", **options: object) -> DeviceRig:
     lists, as text, numbers, True and False, or a size as (width, height). Raises `DeviceError` for an unknown
     rig or option, and for devices that cannot be opened. A calibrated rig is read by `load_calibration`.
     """
-    name, texts = os.fspath(name), {key: _as_text(value) for key, value in options.items()}
+    name, texts = path_text(name), {key: _as_text(value) for key, value in options.items()}
     rig = open_by_texts(name, texts)
     return replace(rig, notes={**rig.notes, **rig_notes(name, texts)})
 
@@ -128,7 +127,7 @@ def scan(
     """
     from dsl_core import pipeline
 
-    path = Path(folder)
+    path = path_of(folder)
     if (path / MANIFEST_NAME).exists():
         refuse_other_rig(path, read_manifest(path).notes, rig.notes, default_options)
     chosen = pipeline.fit_plan(CapturePlan(), rig) if plan is None else _plan(rig, plan)
@@ -141,7 +140,7 @@ def load_scan(folder: FilePath) -> ScanReader:
 
     Raises `StoreError` where there is none, or where it is damaged.
     """
-    return ScanReader(Path(folder))
+    return ScanReader(path_of(folder))
 
 
 def load_calibration(path: FilePath) -> Rig:
@@ -150,7 +149,7 @@ def load_calibration(path: FilePath) -> Rig:
     Names are those that ``dsl-scan calibrations list`` shows. Raises `CalibrationError` naming the fields
     that are wrong, and `StoreError` where there is no such file or name.
     """
-    return calibration_library.load_calibration(os.fspath(path))
+    return calibration_library.load_calibration(path_text(path))
 
 
 @names_missing_packages
@@ -182,7 +181,7 @@ def reconstruct(
     import dsl_core.api.accessor  # noqa: F401  (registers ``.dsl``)
     from dsl_core.workflows.scans import reconstruct_scan
 
-    folder = scan.folder if isinstance(scan, ScanReader) else Path(scan)
+    folder = scan.folder if isinstance(scan, ScanReader) else path_of(scan)
     options = Options(
         grid=_grid(bands_nm),
         correspondence=correspondence,

@@ -47,6 +47,59 @@ def test_a_part_of_a_result_says_what_it_lacks(ask: Ask, words: str) -> None:
         ask(small_result())
 
 
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda r, path: dsl.evaluate(path),
+        lambda r, path: dsl.export(path, "a.csv"),
+        lambda r, path: dsl.save_result(path, "a.zarr"),
+        lambda r, path: dsl.classify(path, pins={"a": (1, 3)}),
+        lambda r, path: dsl.colours(path, {"a": (1, 3)}),
+        lambda r, path: r.dsl.spectrum(4, 2).dsl.difference(path),
+    ],
+)
+@pytest.mark.parametrize("given", ["a.zarr", None])
+def test_what_is_no_result_is_told(ask: Callable[[xr.Dataset, Any], Any], given: Any) -> None:
+    with pytest.raises(DecodeError, match=r"A result is needed.*of type (str|NoneType)\."):
+        ask(small_result(), given)
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda given: dsl.load_result(given),
+        lambda given: dsl.load_scan(given),
+        lambda given: dsl.load_calibration(given),
+        lambda given: dsl.read_spectra(given),
+        lambda given: dsl.reconstruct(given),
+        lambda given: dsl.open_rig(given),
+        lambda given: dsl.export(small_result(), given),
+        lambda given: small_result().dsl.save(given),
+        lambda given: dsl.classify(small_result(), [given]),
+    ],
+)
+@pytest.mark.parametrize("given", [5, b"a.zarr", None, {"a": (1, 3)}])
+def test_what_is_no_path_is_told(ask: Callable[[Any], Any], given: Any) -> None:
+    with pytest.raises(StoreError, match=r"A path is needed.*of type (int|bytes|NoneType|dict)\."):
+        ask(given)
+
+
+@pytest.mark.parametrize("pixels", [(4, 2), [4, 2], np.array([[4, 2]]), [(4.0, 2)], [np.array([4, 2])]])
+def test_pixels_of_a_table_are_a_list_an_array_or_one(tmp_path: Path, pixels: Any) -> None:
+    dsl.export(small_result(), tmp_path / "a.csv", pixels=[(4, 2)])
+    dsl.export(small_result(), tmp_path / "b.csv", pixels=pixels)
+    assert (tmp_path / "b.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "pixels", [5, (4, 2, 1, 1), [(4, 2, 1)], [(1, 2), (3,)], "4,2", [(4.5, 2)], [(float("nan"), 2)], {4: 2}]
+)
+@pytest.mark.filterwarnings("error")
+def test_what_is_no_list_of_pixels_is_told(tmp_path: Path, pixels: Any) -> None:
+    with pytest.raises(StoreError, match="A pixel is x, y in whole pixels"):
+        dsl.export(small_result(), tmp_path / "a.csv", pixels=pixels)
+
+
 def test_what_keeps_its_axes_is_answered() -> None:
     result = small_result()
     assert result.isel(y=[3]).dsl.points().sizes["point"] == result.sizes["x"]

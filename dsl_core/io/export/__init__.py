@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.errors import StoreError
-from dsl_core.io.export.csv import Pixel, export_csv
+from dsl_core.io.export.csv import Pixel, export_csv, whole_pixels
 from dsl_core.io.export.depth_maps import export_npy, export_tiff
 from dsl_core.io.export.envi import export_envi
 from dsl_core.io.export.exr import export_exr
@@ -112,7 +112,7 @@ def export_by_ending(
     A table (csv) is of ``pixels``, (x, y) each, or of the spectrum that the result is. Raises `StoreError`
     for what a format does not hold, and where the disk fails.
     """
-    result, ending = canonical(result), path.suffix.lower()
+    result, ending, pixels = canonical(result), path.suffix.lower(), whole_pixels(pixels)
     listed = [each for each in formats().values() if each.listed]
     meant = next((each.key for each in listed if ending in (each.suffix, *each.endings)), ending[1:])
     chosen = (name or meant).lower()

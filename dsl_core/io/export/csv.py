@@ -11,6 +11,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.export.wording import deviation_text, figure_text, header_lines
@@ -50,8 +53,9 @@ def export_csv(
 ) -> list[Path]:
     """Write the spectra of pixels given as (x, y).
 
-    Raises `StoreError` when no pixel is given or one is outside the image.
+    Raises `StoreError` when no pixel is given, one is outside the image, or one is not two numbers.
     """
+    pixels = whole_pixels(pixels)
     require_suffix(path, ".csv")
     require(result, "A table of spectra", "reflectance", "wavelength_nm")
     _check_pixels(result, pixels)
@@ -66,6 +70,21 @@ def export_csv(
             check()
             writer.writerows(_rows(result, pixel))
     return [path]
+
+
+def whole_pixels(given: ArrayLike) -> list[Pixel]:
+    """Pixels (x, y) from a list or an array of them, or from one; raises `StoreError` for anything else."""
+    try:
+        values = np.atleast_2d(np.asarray(given, float))
+        if not values.size:
+            return []
+        with np.errstate(invalid="ignore"):
+            whole = values.astype(int)
+    except (TypeError, ValueError):
+        values = whole = np.empty(0)
+    if values.shape[1:] != (2,) or (whole != values).any():
+        raise StoreError(f"A pixel is x, y in whole pixels, as in [(50, 30), (60, 40)]; given {given!r}.")
+    return [(x, y) for x, y in whole.tolist()]
 
 
 def _check_pixels(result: xr.Dataset, pixels: Sequence[Pixel]) -> None:
