@@ -1,7 +1,7 @@
 # %% [markdown]
 # # What accuracy costs
 #
-# The same object with three plans: what more frames buy. On a real rig the minutes are those of exposures
+# The same object with two plans: what more frames buy. On a real rig the minutes are those of exposures
 # and of the projector; the twin renders in seconds.
 
 # %%
@@ -9,7 +9,7 @@ import dsl_core as dsl
 
 found = []
 with dsl.open_rig("twin", size="64x48", scene="color-checker") as rig:
-    for preset in ("preview", "quick"):
+    for preset in ("preview", "comb"):
         plan = dsl.plan(rig, preset)
         scan = dsl.scan(rig, f"{preset}.dsl", plan)
         result = dsl.reconstruct(scan, bands_nm=(430, 660, 10))
@@ -25,5 +25,5 @@ for preset, frames, seconds, deviation in found:
 # finished scan is not captured again.
 
 # %%
-again = dsl.load_result("quick.zarr")
+again = dsl.load_result("comb.zarr")
 print(again["depth_mm"].median().item())

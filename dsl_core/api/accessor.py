@@ -214,7 +214,13 @@ class ResultAccessor:
     def _require_spectra(self) -> None:
         if "reflectance" not in self._result:
             raise DecodeError("The result contains depth only. Reconstruct the scan with spectra=True.")
-        if BANDS not in self._result["reflectance"].dims:
+        dims = self._result["reflectance"].dims
+        if BANDS not in dims and set(dims) - {"x", "y"}:
+            raise DecodeError(
+                f"The result has no axis {BANDS}; its reflectance is over {', '.join(map(str, dims))}."
+                " Rename the one of the bands."
+            )
+        if BANDS not in dims:
             raise DecodeError(
                 "The result has one band, without the axis of bands. Choose a list of one, such as"
                 f" result.isel({BANDS}=[3]), which keeps the axis."

@@ -114,12 +114,11 @@ def predict(rig: DeviceRig, plan: CapturePlan | str, calibration: Rig | FilePath
 def scan(
     rig: DeviceRig,
     folder: FilePath,
-    plan: CapturePlan | str | None = None,
+    plan: CapturePlan | str = "reference",
     progress: Progress | None = None,
 ) -> ScanReader:
     """Capture a plan, or the preset of that name, into a folder, and return the stored scan.
 
-    Without one, it is the reference plan.
     Every frame is on disk before the next is taken. A folder with an unfinished scan of the same plan and rig
     is resumed, and one with a finished scan is left as it is. Raises `PlanError` for a plan that is
     impossible on the rig, `DeviceError` for a device that fails and `StoreError` where the folder cannot be
@@ -130,8 +129,7 @@ def scan(
     path = path_of(folder)
     if (path / MANIFEST_NAME).exists():
         refuse_other_rig(path, read_manifest(path).notes, rig.notes, default_options)
-    chosen = pipeline.fit_plan(CapturePlan(), rig) if plan is None else _plan(rig, plan)
-    pipeline.scan(rig, chosen, path, progress, dict(rig.notes))
+    pipeline.scan(rig, _plan(rig, plan), path, progress, dict(rig.notes))
     return ScanReader(path)
 
 

@@ -10,11 +10,11 @@ import typer
 from dsl_core.cli.options import (
     Effects,
     Json,
+    PlanChoice,
     PlanSource,
     RigOptions,
     Tolerance,
     parse_options,
-    plan_of,
     with_effects,
 )
 from dsl_core.cli.output import Output
@@ -46,7 +46,6 @@ def effects(
     """Show which effects of light a scene needs, and why: how much each changes at most, and its cost."""
     from dsl_core.capture.preflight import fit_plan
     from dsl_core.devices.registry import open_rig
-    from dsl_core.model.plan import CapturePlan
     from dsl_core.simulation.effects.planner import describe
     from dsl_core.simulation.sim_devices import SimCamera
 
@@ -57,7 +56,7 @@ def effects(
         options["scene"] = scene
     if "effects" not in options:
         options = with_effects(options, effects, None)
-    captured = plan_of(plan) if plan else CapturePlan()
+    captured = PlanChoice(plan).build()
     with open_rig("twin", with_effects(options, None, tolerance)) as rig:
         assert isinstance(rig.camera, SimCamera)
         world = rig.camera.world

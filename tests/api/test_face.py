@@ -13,10 +13,13 @@ import pytest
 import xarray as xr
 
 import dsl_core as dsl
+from dsl_core import pipeline
 from dsl_core.cli.output import Output
 from dsl_core.cli.results import print_figures
-from dsl_core.errors import CalibrationError, DecodeError, PlanError, StoreError
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError, Cancelled, DecodeError, PlanError, StoreError
 from dsl_core.io.scan.folder import ScanReader
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS
 from dsl_core.resources import resource_path
 
@@ -75,6 +78,17 @@ def test_a_scan_of_another_scene_is_not_handed_out_as_the_new_one(scan: ScanRead
         plan = dsl.plan(rig, "quick")
         with pytest.raises(StoreError, match=words):
             dsl.scan(rig, scan.folder, plan)
+
+
+def test_a_scan_without_a_plan_is_the_reference_as_on_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def captured(rig: DeviceRig, plan: CapturePlan, *_: object) -> None:
+        raise Cancelled(f"{plan.name}, {plan.shot_count} frames")
+
+    monkeypatch.setattr(pipeline, "scan", captured)
+    with dsl.open_rig("twin") as rig, pytest.raises(Cancelled, match="reference, 748 frames"):
+        dsl.scan(rig, tmp_path / "a.dsl")
 
 
 def test_plans_by_name_and_with_changes() -> None:

@@ -27,6 +27,10 @@ Ask = Callable[[xr.Dataset], Any]
             lambda r: r.isel(wavelength_nm=3).dsl.spectrum(4, 2),
             r"one band, .* result.isel\(wavelength_nm=\[3\]",
         ),
+        (
+            lambda r: r.rename(wavelength_nm="wl").dsl.spectrum(4, 2),
+            "no axis wavelength_nm; its reflectance is over wl, y, x",
+        ),
         (lambda r: r.isel(wavelength_nm=3).dsl.region((1, 1, 3, 2)), "has one band"),
         (lambda r: r.isel(y=3).dsl.points(), r"has no axis y, .* result.isel\(y=\[30\]\)"),
         (lambda r: r.isel(y=3).dsl.region((1, 3, 3, 1)), "has no axis y"),
