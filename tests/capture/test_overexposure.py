@@ -86,7 +86,7 @@ def test_a_scan_tells_it_once_and_ends_as_usual(tmp_path, caplog) -> None:  # ty
 
 def test_exposures_that_were_matched_to_the_scene_are_not_called_too_long(tmp_path, caplog) -> None:  # type: ignore[no-untyped-def]
     """They let white saturate as far as lines, which have less light, do not."""
-    rig = open_twin({"size": "48x32", "scene": "plane", "depth_mm": 742.1})
+    rig = open_twin({"size": "48x32", "scene": "plane", "depth_mm": "742.1"})
     plan = CapturePlan(
         code=GrayCode(rows=False),
         spectral=ScanLines(width_px=40, step_px=40),
