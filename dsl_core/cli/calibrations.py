@@ -122,6 +122,8 @@ def check(
     kept = is_listed and not overridden and keep_check(library, name, figures, now())
     if kept:
         output.say(f"{name} now remembers this check: scans from now on state the light by it.")
+    if spectralon and not is_listed:
+        output.say(f"{name} is a file and does not remember this check; a calibration of the library does.")
     output.put(name=name, figures=figures_json(figures), stable=not failures(figures), kept=kept)
     wrong = failures(figures)
     if wrong:

@@ -9,7 +9,7 @@ import pytest
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.calibration_library import CalibrationLibrary
-from dsl_core.io.rig_file import load_rig
+from dsl_core.io.rig_file import load_rig, save_rig
 from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Provenance, Rig
@@ -81,13 +81,17 @@ def test_a_calibration_travels(give: Give, tmp_path: Path, library: CalibrationL
 
 
 @pytest.mark.slow
-def test_a_quick_shot_says_whether_the_rig_has_changed(give: Give, library: CalibrationLibrary) -> None:
+def test_a_quick_shot_says_whether_the_rig_has_changed(
+    give: Give, library: CalibrationLibrary, tmp_path: Path
+) -> None:
     library.store("lab", calibrated())
     ending = give("calibrations", "check", "lab", "--yes", *PLANE, "--json")
     assert ending.code == 0, ending.err
     assert ending.json["stable"] is True
     assert len(ending.json["figures"]) == 9
-    assert ending.json["kept"] is False  # nobody noted when this light was calibrated
+    assert ending.json["kept"] is True, "although nobody noted when this light was calibrated"
+    path = save_rig(calibrated(), tmp_path / "rig.json")
+    assert "is a file and does not remember" in give("calibrations", "check", path, "--yes", *PLANE).out
     library.store("lab", calibrated(1.1))
     dated = calibrated(1.1).model_copy(update={"provenance": Provenance(created="2026-03-01")})
     library.store("lab", dated)
