@@ -39,14 +39,7 @@ def staged(
     are as before and nothing is left behind. Raises `StoreError` when a target exists and may not be
     replaced, when the folder cannot be used, or when the disk fails.
     """
-    home = targets[0].parent
-    clear_leftovers(home)
-    check_targets(targets, overwrite=overwrite, kind=kind)
-    room = home / f".{targets[0].name}.{uuid.uuid4().hex[:8]}{PARTIAL_SUFFIX}"
-    lock: FolderLock | None = None
-    try:
-        make_durable(home)
-        lock = _furnished(room)
+    with _room_for(targets, overwrite, kind) as room:
         drafts = [room / target.name for target in targets]
         yield drafts
         for draft in drafts:
@@ -55,7 +48,40 @@ def staged(
         check_targets(targets, overwrite=overwrite, kind=kind)
         for draft, target in zip(drafts, targets, strict=True):
             _move_in(draft, target, room)
-        sync_folder(home)
+        sync_folder(targets[0].parent)
+
+
+def put_in_place(folder: Path, target: Path, *, overwrite: bool, kind: FolderKind) -> None:
+    """Sync a finished folder and move it to its target on the same drive, which is whole or as before.
+
+    Whatever fails, the work of hours is still there: the folder stays where it is. Raises as `staged` does.
+    """
+    with _room_for([target], overwrite, kind) as room:
+        _sync_tree(folder)
+        check_targets([target], overwrite=overwrite, kind=kind)
+        # By way of the room, which is where an old one may be left.
+        draft = room / target.name
+        os.replace(folder, draft)
+        try:
+            _move_in(draft, target, room)
+        except OSError:
+            os.replace(draft, folder)
+            raise
+        sync_folder(target.parent)
+
+
+@contextmanager
+def _room_for(targets: Sequence[Path], overwrite: bool, kind: FolderKind | None) -> Iterator[Path]:
+    """A private folder next to targets that are free, cleared at the end."""
+    home = targets[0].parent
+    clear_leftovers(home)
+    check_targets(targets, overwrite=overwrite, kind=kind)
+    room = home / f".{targets[0].name}.{uuid.uuid4().hex[:8]}{PARTIAL_SUFFIX}"
+    lock: FolderLock | None = None
+    try:
+        make_durable(home)
+        lock = _furnished(room)
+        yield room
     except OSError as error:
         raise store_error(targets[0], error) from error
     finally:

@@ -24,7 +24,7 @@ from dsl_core.io.reading import read_bounded
 from dsl_core.io.result.arrays import EMPTY_TOO, PACKINGS, encoded, fits, new_array, stored_as, write_variable
 from dsl_core.io.result.result_file import RESULT_FOLDER, labels_of, opened, seal_folder
 from dsl_core.io.scan.lock import FolderLock
-from dsl_core.io.staging import check_targets, staged
+from dsl_core.io.staging import check_targets, put_in_place
 from dsl_core.model.result import VARIABLES, build_result
 from dsl_core.model.result_sink import Maps
 
@@ -179,10 +179,10 @@ class RowWriter:
         """Move the result to its place, whole or not at all, with its attributes; raises `StoreError`."""
         with self._writing():
             seal_folder(self.work / _ARRAYS, {**attributes, "labels": self._labels})
-            with staged([self._target], overwrite=self._overwrite, kind=RESULT_FOLDER) as (draft,):
-                os.replace(self.work / _ARRAYS, draft)
-                # Before the result is there, so that a kill leaves nothing that seems to be its beginning.
-                self._tidy()
+            place = self._target
+            put_in_place(self.work / _ARRAYS, place, overwrite=self._overwrite, kind=RESULT_FOLDER)
+        # Not before the result is there; what a kill leaves has no arrays, and is made anew.
+        self._tidy()
         return self._target
 
     def __enter__(self) -> Self:

@@ -15,6 +15,7 @@ import xarray as xr
 import zarr
 
 from dsl_core.errors import StoreError
+from dsl_core.io import staging
 from dsl_core.io.result import row_writer
 from dsl_core.io.result.arrays import write_variable
 from dsl_core.io.result.result_file import load_result, save_result
@@ -190,6 +191,30 @@ def test_a_result_is_replaced_only_when_that_is_wanted(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="already exists"):
         RowWriter(target, "a")
     assert float(write(target, maps(0.5), overwrite=True)["reflectance"].max()) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("at", ["sync", "target", "move"])
+def test_a_finished_result_is_kept_whatever_disturbs_its_last_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: str
+) -> None:
+    target, given = tmp_path / "r.zarr", maps()
+
+    def disturbed(*_: Path) -> None:
+        if at != "target":
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        target.mkdir()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(staging, "_move_in" if at == "move" else "_sync_tree", disturbed)
+        with pytest.raises(StoreError):
+            write(target, given)
+    if at == "target":
+        target.rmdir()
+    with RowWriter(target, "a") as writer:
+        begin(writer)
+        assert [writer.note_of(rows) for rows in BANDS] == [f"{rows}" for rows in BANDS]
+    xr.testing.assert_identical(write(target, given), write(tmp_path / "again.zarr", given))
+    assert [path.name for path in tmp_path.glob(".*")] == []
 
 
 @pytest.mark.parametrize(
