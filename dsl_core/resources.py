@@ -1,11 +1,44 @@
-"""Finds a file of ``resources/`` in the source tree, in an installed wheel and in a frozen app."""
+"""Finds a user's folders, and ``resources/`` in the source tree, an installed wheel and a frozen app."""
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
+from typing import Literal
 
 from dsl_core.errors import StoreError
+
+#: Names the folder of everything this program keeps for a user, instead of the system's usual place.
+HOME_VARIABLE = "DSL_SCAN_HOME"
+
+
+def own_folder(kind: Literal["data", "config", "cache"] = "data") -> Path:
+    """Where this program keeps what is a user's: the folder in ``DSL_SCAN_HOME``, or the system's place.
+
+    It is in ``~`` for a user without a home: nothing is found there, and writing it is refused.
+    """
+    import platformdirs
+
+    if named := os.environ.get(HOME_VARIABLE):
+        return Path(named)
+    usual = {
+        "data": platformdirs.user_data_path,
+        "config": platformdirs.user_config_path,
+        "cache": platformdirs.user_cache_path,
+    }
+    try:
+        return usual[kind]("dsl-scan", appauthor=False)
+    except RuntimeError:
+        return Path("~") / "dsl-scan"
+
+
+def expanded(path: Path) -> Path:
+    """A path with the home folder that its ``~`` stands for, which stays where there is none."""
+    try:
+        return path.expanduser()
+    except RuntimeError:
+        return path
 
 
 def resource_roots() -> tuple[Path, ...]:

@@ -9,11 +9,40 @@ import pytest
 
 from dsl_core import resources
 from dsl_core.errors import StoreError
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.rig_profile import profile_names
+from dsl_core.io.scan.origin import is_of_this_computer, rig_notes
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.workflows.diagnosis import diagnosis
 
 
 def test_a_resource_of_the_source_tree_is_found() -> None:
     path = resources.resource_path("bibliography.bib")
     assert path.read_text(encoding="utf-8").startswith("%")
+
+
+def test_a_user_without_a_home_finds_nothing_and_is_told_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a container that was started with the number of a user whom it does not know."""
+
+    pwd = pytest.importorskip("pwd", reason="the system keeps no table of users")
+
+    def unknown(number: int) -> None:
+        raise KeyError(number)
+
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    for name in ("HOME", "DSL_SCAN_HOME", "XDG_DATA_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+    assert is_of_this_computer(rig_notes("twin", {}))
+    assert next(diagnosis(tmp_path))[0] == "dsl-scan"
+    assert [*profile_names(), *CalibrationLibrary().names()] == []
+    with pytest.raises(StoreError, match="set DSL_SCAN_HOME to a folder"):
+        CalibrationLibrary().store("lab", published_rig())
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "own"))
+    assert CalibrationLibrary().store("lab", published_rig()).name == "lab"
 
 
 @pytest.mark.parametrize("name", ["no_such_file.txt", "../pyproject.toml", "/etc/hosts"])

@@ -25,9 +25,8 @@ from dsl_core.io.rig_file import load_rig
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.rig import Rig
+from dsl_core.resources import own_folder
 
-#: Names the folder of everything this program keeps for a user, instead of the system's usual place.
-HOME_VARIABLE = "DSL_SCAN_HOME"
 _NAME = re.compile(r"\w[\w .+-]*")
 
 
@@ -78,13 +77,7 @@ def check_name(name: str) -> None:
 
 def library_home(home: Path | None = None) -> Path:
     """The folder of the library: the one given, that of ``DSL_SCAN_HOME``, or the system's usual place."""
-    import platformdirs
-
-    if home is not None:
-        return home
-    named = os.environ.get(HOME_VARIABLE)
-    base = Path(named) if named else Path(platformdirs.user_data_dir("dsl-scan", appauthor=False))
-    return base / "calibrations"
+    return own_folder() / "calibrations" if home is None else home
 
 
 class CalibrationLibrary:

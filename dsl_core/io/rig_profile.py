@@ -8,17 +8,17 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.doctor import DATA_SHEETS, Finding, Grade, examine
 from dsl_core.devices.profile import RigProfile, open_parts
 from dsl_core.errors import DeviceError, DslError
-from dsl_core.io.calibration_library import library_home
 from dsl_core.io.records import read_record, write_record
 from dsl_core.io.rig_file import load_rig
 from dsl_core.model.rig import Rig
+from dsl_core.resources import own_folder
 
 SUFFIX = ".json"
 
 
 def profiles_folder() -> Path:
     """Where profiles are found by name, next to the calibration library; it need not exist."""
-    return library_home().parent / "rigs"
+    return own_folder() / "rigs"
 
 
 def profile_path(name: str) -> Path | None:

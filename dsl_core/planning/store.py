@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import write_atomic
-from dsl_core.io.calibration_library import library_home
+from dsl_core.io.atomic import make_folder, write_atomic
 from dsl_core.io.reading import read_json
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.planning.expected import Prediction
-from dsl_core.resources import resource_path
+from dsl_core.resources import own_folder, resource_path
 from dsl_core.version import __version__
 
 _log = logging.getLogger(__name__)
@@ -32,7 +31,7 @@ SHIPPED = "predictions/twin.json"
 
 def store_folder() -> Path:
     """Where predictions are kept on this system, for the window and the command line."""
-    return library_home().parent / "forecasts"
+    return own_folder() / "forecasts"
 
 
 class PredictionStore:
@@ -78,7 +77,7 @@ class PredictionStore:
         if not self._is_changed:
             return
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(self._path.parent)
             write_atomic(self._path, json.dumps(self._known).encode())
             old = sorted(self._path.parent.glob("*.json"), key=lambda path: path.stat().st_mtime)
             for path in old[:-MOST_RIGS]:

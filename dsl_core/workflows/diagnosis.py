@@ -13,6 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from dsl_core.extras import EXTRA_OF
+from dsl_core.resources import expanded
 from dsl_core.version import __version__
 
 #: Draws and lists screens in a process of its own; named, as the engine imports no window.
@@ -132,5 +133,5 @@ def _devices() -> Iterator[tuple[str, str]]:
 
 
 def _home_as_tilde(path: str) -> str:
-    home = str(Path.home())
+    home = str(expanded(Path("~")))
     return path.replace(home, "~", 1) if len(home) > 1 and path.startswith(home) else path

@@ -7,13 +7,12 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from dsl_app.shared.settings import HOME_VARIABLE
-
 from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.result.result_file import save_result
 from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.presets import PRESETS
+from dsl_core.resources import HOME_VARIABLE
 from dsl_core.workflows import scans
 from tests.cases.tiny_campaign import command_all, give
 

@@ -12,13 +12,13 @@ from typing import TypeVar
 
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
-from dsl_app.shared.settings import HOME_VARIABLE
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtGui import QCursor, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog, QPushButton, QWidget
 
+from dsl_core.resources import HOME_VARIABLE
 from tests.screens.look import Look
 from tests.screens.material import CHART, Material
 

@@ -218,7 +218,7 @@ def test_frames_are_not_brought_from_a_store_where_the_result_is_taken(
     give: Give, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("obstore", reason="the extra s3 is not installed")
-    monkeypatch.setattr(rooms, "user_cache_path", lambda name: tmp_path / "cache")
+    monkeypatch.setattr(rooms, "own_folder", lambda kind: tmp_path / "cache")
     with running() as store:
         for name, value in store.environment().items():
             monkeypatch.setenv(name, value)

@@ -9,13 +9,14 @@ import pytest
 from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError, DecodeError, StoreError
-from dsl_core.io.calibration_library import HOME_VARIABLE, CalibrationLibrary
+from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
 from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.origin import model_notes, rig_notes
 from dsl_core.model.plan import CapturePlan, GrayCode, Setting
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.resources import HOME_VARIABLE
 from dsl_core.workflows.inspection import find_scan, intensity_graph, read_block
 from dsl_core.workflows.scans import reconstruct_scan
 

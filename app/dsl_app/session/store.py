@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from dsl_app.session.records import Session
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import set_aside, write_atomic
+from dsl_core.io.atomic import make_folder, set_aside, write_atomic
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.scan.origin import computer_name
 
@@ -75,7 +75,7 @@ class SessionStore:
 
     def _write(self, session: Session) -> str:
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
+            make_folder(self._folder)
             write_atomic(self._path, session.model_dump_json(indent=1).encode())
         except (OSError, StoreError) as error:
             return self._complain(f"The open session cannot be saved for recovery after a crash: {error}")

@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 
 from dsl_core.io.reading import there as there
+from dsl_core.resources import expanded as expanded
 
 #: File systems take names of 255 bytes; while a file is written, its name has up to 18 more.
 MOST_NAME_BYTES = 220
@@ -41,14 +42,6 @@ def barrier(path: Path) -> str:
     except OSError as error:
         return error.strerror or str(error)
     return ""
-
-
-def expanded(path: Path) -> Path:
-    """A path with the home folder that its ``~`` stands for; `place_trouble` tells where there is none."""
-    try:
-        return path.expanduser()
-    except RuntimeError:
-        return path
 
 
 def place_trouble(path: Path) -> str:

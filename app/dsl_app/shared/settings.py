@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,13 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dsl_app.shared.evented import Value
 from dsl_app.shared.paths import barrier, there
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import set_aside, write_atomic
+from dsl_core.io.atomic import make_folder, set_aside, write_atomic
 from dsl_core.io.reading import read_json
+from dsl_core.resources import expanded, own_folder
 
 _log = logging.getLogger(__name__)
 RECENT_COUNT = 12
-#: Names another folder for settings, for tests and for portable installations.
-HOME_VARIABLE = "DSL_SCAN_HOME"
 #: What a program that is killed must know next time; the page that was open is offered again.
 EARLY = ("rig", "rig_options", "recent", "tour_seen", "campaign", "campaigns_folder", "calibration")
 #: Options are of their rig.
@@ -86,22 +84,12 @@ def entry_text(path: Path) -> str:
 
 def settings_folder() -> Path:
     """Folder of the settings on this system."""
-    given = os.environ.get(HOME_VARIABLE)
-    if given:
-        return Path(given)
-    from platformdirs import user_config_path
-
-    return user_config_path("dsl-scan", appauthor=False)
+    return own_folder("config")
 
 
 def data_folder() -> Path:
     """Folder of the program's own data, such as the demo."""
-    given = os.environ.get(HOME_VARIABLE)
-    if given:
-        return Path(given)
-    from platformdirs import user_data_path
-
-    return user_data_path("dsl-scan", appauthor=False)
+    return own_folder()
 
 
 def demo_folder() -> Path:
@@ -111,7 +99,7 @@ def demo_folder() -> Path:
 
 def folder_for(path: Path) -> Path:
     """Where a person looks for what is written of a scan or result: next to it, at home for an example."""
-    return Path.home() if path.parent == demo_folder() else path.parent
+    return expanded(Path("~")) if path.parent == demo_folder() else path.parent
 
 
 def load_settings(path: Path) -> tuple[Settings, str]:
@@ -144,7 +132,7 @@ def _load(path: Path) -> tuple[Settings | None, str]:
 def save_settings(settings: Settings, path: Path) -> str:
     """Write the settings; returns a sentence on what went wrong (empty: nothing), never raises."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         write_atomic(path, settings.model_dump_json(indent=1).encode())
     except (OSError, StoreError) as error:
         return _unsaved(error)

@@ -45,7 +45,12 @@ def address_of(path: Path) -> Address | None:
 
 
 def require_local(path: Path) -> None:
-    """Raise `StoreError` for an address: as a path, it would make folders named ``s3:`` on this computer."""
+    """Raise `StoreError` for an address or ``~``: as paths, they would make folders with such names."""
+    if path.parts[:1] == ("~",):
+        raise StoreError(
+            f"{path} cannot be written: ~ stands for a home folder, and this user has none, or it was not"
+            " looked up. Give a whole path; set DSL_SCAN_HOME to a folder for what the program keeps itself."
+        )
     address = address_of(path)
     if address is not None:
         raise StoreError(

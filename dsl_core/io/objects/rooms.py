@@ -8,14 +8,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from platformdirs import user_cache_path
-
 from dsl_core.extras import require_package
 from dsl_core.io.claims import Claim
 from dsl_core.io.objects.address import Address, address_of
 from dsl_core.io.objects.copies import fetch, publish, published_as, taken
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.progress import Progress
+from dsl_core.resources import own_folder
 
 #: How names of a scan's frames begin.
 _FRAMES = "frames/c."
@@ -24,7 +23,7 @@ _FRAMES = "frames/c."
 def room_of(address: Address) -> Path:
     """Where a folder of a store is kept here until it is no longer needed."""
     digest = hashlib.sha256(str(address).encode()).hexdigest()[:16]
-    return user_cache_path("dsl-scan") / "objects" / digest / Path(address.name).name
+    return own_folder("cache") / "objects" / digest / Path(address.name).name
 
 
 @contextmanager

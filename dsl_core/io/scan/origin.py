@@ -10,6 +10,7 @@ from pathlib import Path
 
 from dsl_core.errors import StoreError
 from dsl_core.model.rig import Rig
+from dsl_core.resources import expanded
 
 _RIG, _OPTIONS, _COMPUTER = "scanned_with", "scanned_with_options", "scanned_on"
 _CALIBRATION, _CORRESPONDENCE = "calibration_digest", "correspondence"
@@ -46,7 +47,8 @@ def computer_name() -> str:
 def _this_computer(name: str | None = None) -> str:
     """A digest, so that a scan that is handed on names neither computer nor user."""
     name = computer_name() if name is None else name
-    return hashlib.sha256(f"{name}\n{Path.home()}".encode()).hexdigest()[:16]
+    home = expanded(Path("~"))
+    return hashlib.sha256(f"{name}\n{home}".encode()).hexdigest()[:16]
 
 
 def rig_of_notes(notes: Mapping[str, object]) -> tuple[str, dict[str, str]] | None:

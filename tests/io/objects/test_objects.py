@@ -29,7 +29,7 @@ RESULT = Address("bucket", "2026/a.zarr")
 @pytest.fixture
 def twin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[ObjectStoreTwin]:
     """An empty store, in the environment; rooms for it are in a folder of the test."""
-    monkeypatch.setattr(rooms, "user_cache_path", lambda name: tmp_path / "cache")
+    monkeypatch.setattr(rooms, "own_folder", lambda kind: tmp_path / "cache")
     monkeypatch.setattr(store, "_RETRY", {"max_retries": 0})
     with running() as twin:
         for name, value in twin.environment().items():

@@ -26,7 +26,7 @@ OPTIONS = Options(spectra=False, refine_columns=False, band_rows=16)
 @pytest.fixture
 def stored(scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ObjectStoreTwin]:
     """A store with the scan as ``s3://bucket/day/a.dsl``; what is brought from it is in ``cache``."""
-    monkeypatch.setattr(rooms, "user_cache_path", lambda name: tmp_path / "cache")
+    monkeypatch.setattr(rooms, "own_folder", lambda kind: tmp_path / "cache")
     with running() as twin:
         for name, value in twin.environment().items():
             monkeypatch.setenv(name, value)

@@ -152,7 +152,6 @@ class ProfileController:
         if profile is None:
             return False
         try:
-            draft.target.parent.mkdir(parents=True, exist_ok=True)
             # What was opened is replaced; nothing else is.
             save_profile(profile, draft.target, overwrite=draft.target == draft.path)
         except TakenError:

@@ -10,7 +10,7 @@ from pathlib import Path
 from PySide6.QtCore import QStandardPaths
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from dsl_app.shared.paths import is_dir
+from dsl_app.shared.paths import expanded, is_dir
 
 _last: list[Path] = []
 
@@ -19,7 +19,7 @@ def start_folder() -> str:
     """Where the last choice was made, while that folder is there; else the documents, else the home."""
     documents = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
     places = [*_last, *([Path(documents)] if documents else [])]
-    return str(next((place for place in places if is_dir(place)), Path.home()))
+    return str(next((place for place in places if is_dir(place)), expanded(Path("~"))))
 
 
 def chosen_in(path: Path) -> None:
