@@ -1,7 +1,7 @@
 """A small object store that speaks as much of S3 as this program uses, in a thread of the test.
 
-Requests: GET, HEAD, PUT (also only where nothing is, and in parts), DELETE, LIST of version 2. Answers are
-those of the reference: https://docs.aws.amazon.com/AmazonS3/latest/API/Welcome.html
+Requests: GET, HEAD, PUT (also only where nothing is, only onto a known object, and in parts), DELETE, LIST
+of version 2. Answers are those of the reference: https://docs.aws.amazon.com/AmazonS3/latest/API/Welcome.html
 """
 
 from __future__ import annotations
@@ -133,6 +133,10 @@ def _handler(store: ObjectStoreTwin) -> type[BaseHTTPRequestHandler]:
             if "partNumber" in query:
                 name = f"{name}{_PART}{int(query['partNumber'][0]):04d}"
             if self.headers.get("If-None-Match") == "*" and name in store.objects:
+                self._answer(412, b"<Error><Code>PreconditionFailed</Code></Error>")
+                return
+            wanted = self.headers.get("If-Match")
+            if wanted is not None and wanted != _tag(store.objects.get(name, b"")):
                 self._answer(412, b"<Error><Code>PreconditionFailed</Code></Error>")
                 return
             store.put(name, content)

@@ -83,6 +83,15 @@ class ObjectFolder:
                 return False
             return True
 
+    def replace(self, name: str, content: bytes, found: Found) -> None:
+        """Write an object in place of one that was found, unless somebody has changed it since."""
+        import obstore
+        from obstore.exceptions import PreconditionError
+
+        changed = contextlib.suppress(FileNotFoundError, PreconditionError)
+        with self._told("could not be written"), changed:
+            obstore.put(self._store, name, content, mode={"e_tag": found.tag}, use_multipart=False)
+
     def remove(self, names: list[str]) -> None:
         """Delete objects, if they are there."""
         import obstore

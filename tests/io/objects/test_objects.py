@@ -178,8 +178,42 @@ def test_a_claim_in_a_store_holds_and_lapses(twin: ObjectStoreTwin) -> None:
     twin.age("2026/.claims/a.zarr.claim", 1000)
     with ObjectClaim(RESULT) as mine:
         assert "which died; it is made again" in mine.taken_over
-    claim.release()
+        claim.release()  # its computer slept, and is awake again
+        with pytest.raises(ClaimedError):
+            ObjectClaim(RESULT)
     assert not [name for name in twin.objects if ".claims" in name]
+
+
+def test_an_owner_that_slept_does_not_take_its_claim_back(twin: ObjectStoreTwin) -> None:
+    slept, name = ObjectClaim(RESULT), "2026/.claims/a.zarr.claim"
+    twin.age(name, 1000)
+    with ObjectClaim(RESULT):
+        mine = twin.objects[name]
+        slept._beat(0.01)  # it ends when it finds that the claim is another's
+        assert twin.objects[name] == mine
+    slept.release()
+
+
+def test_one_of_two_takes_over_what_a_dead_owner_claimed(
+    twin: ObjectStoreTwin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed, quicker = ObjectFolder.listed, list[ObjectClaim]()
+
+    def slowly(self: ObjectFolder) -> dict[str, store.Found]:
+        found = listed(self)
+        if not quicker:
+            monkeypatch.setattr(ObjectFolder, "listed", listed)
+            quicker.append(ObjectClaim(RESULT))
+        return found
+
+    dead = ObjectClaim(RESULT)
+    twin.age("2026/.claims/a.zarr.claim", 1000)
+    monkeypatch.setattr(ObjectFolder, "listed", slowly)
+    with pytest.raises(ClaimedError):
+        ObjectClaim(RESULT)
+    assert quicker[0]._is_mine()
+    quicker[0].release()
+    dead.release()
 
 
 def test_several_may_ask_at_once_who_has_a_claim(
