@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -205,12 +206,10 @@ def _read(path: Path) -> NDArray[Any]:
 
     # Through memory, because OpenCV cannot open every path on Windows.
     picture = None
-    try:
+    with contextlib.suppress(OSError, cv2.error):  # as for an empty file, or a size beyond OpenCV's limit
         data = read_bounded(path, MOST_BYTES)
-    except OSError:
-        data = b""
-    if data and not declares_too_much(data):
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        if not declares_too_much(data):
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if picture is None:
         raise CalibrationError(f"{path} cannot be read as a picture. Copy it again, or leave its pose out.")
     return np.asarray(picture[..., :3] if picture.ndim == 3 else picture)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
+from dsl_core.io.png_parts import SIGNATURE
 from dsl_core.workflows.pictures import calibrate_geometry, pose_folders, read_pose
 from dsl_core.workflows.stacks import depth_of_columns
 from tests.cases import board_sets
@@ -53,3 +56,16 @@ def test_a_pose_without_its_rows_is_named(tmp_path: Path) -> None:
         write(tmp_path / f"capture_{number}", {f"g{i:02d}.png": each for i, each in enumerate(kept)})
     with pytest.raises(CalibrationError, match="capture_1 contains 16 pictures, 30 are needed"):
         calibrate_geometry(tmp_path, board_sets.BOARD, board_sets.PROJECTOR_PX)
+
+
+def test_a_picture_that_opencv_refuses_is_named(tmp_path: Path) -> None:
+    size = struct.pack(">IIBBBBB", 40_000, 40_000, 16, 0, 0, 0, 0)
+    parts = [(b"IHDR", size), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
+    coded = [
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        for name, data in parts
+    ]
+    for index in range(4):
+        (tmp_path / f"graycode_{index}.png").write_bytes(SIGNATURE + b"".join(coded))
+    with pytest.raises(CalibrationError, match=r"graycode_0\.png cannot be read as a picture"):
+        read_pose(tmp_path, (1, 0))
