@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 
@@ -58,6 +59,15 @@ def quoted(word: object) -> str:
     ('scan.dsl', "'my scan.dsl'")
     """
     return shlex.quote(str(word))
+
+
+def readable(name: str) -> str:
+    """The name of a file as a text that can be written; a system may have one that is not in UTF-8.
+
+    >>> readable("leaf"), readable(os.fsdecode(b"B" + bytes([0xE4]) + b"ume")) == f"B{chr(0xFFFD)}ume"
+    ('leaf', True)
+    """
+    return os.fsencode(name).decode(errors="replace")
 
 
 def natural(name: str) -> list[tuple[int, str]]:

@@ -15,6 +15,7 @@ from dsl_core.io.spectra.formats.own_table import BY_PLACE
 from dsl_core.io.spectra.reference_file import as_references, shares_of
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.words import readable
 
 #: How entries become classes: by their name without a number at its end, their folder, their file, or each
 #: its own.
@@ -131,11 +132,11 @@ def _entries(file: Path, note: Callable[[str], None]) -> list[tuple[str, Spectra
         note(f"{file.name}: values up to {as_percent:.3g} are read as percent.")
     if len(spectra) == 1 and (not kind.is_named or BY_PLACE.fullmatch(spectra[0].name)):
         # The title over a single column is mostly "reflectance".
-        spectra = [replace(spectra[0], name=file.stem)]
+        spectra = [replace(spectra[0], name=readable(file.stem))]
     content = as_references(file, spectra)
     if content.empty:
         note(f"{file.name}: without values and left out: {', '.join(content.empty[:5])}.")
-    return [(reference.name or file.stem, reference.curve) for reference in content.references]
+    return [(reference.name or readable(file.stem), reference.curve) for reference in content.references]
 
 
 def _grouped(
@@ -153,9 +154,9 @@ def _grouped(
             case "auto" if not has_folders or (file.parent in tops and len(tops) == 1):
                 return _REPEATED.sub("", name) or name
             case "auto" | "folder":
-                return file.parent.name
+                return readable(file.parent.name)
             case "file":
-                return file.stem
+                return readable(file.stem)
             case "none":
                 return name
         return _NUMBER.sub("", name) or name

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from pydantic import ValidationError
+from pydantic_core import PydanticSerializationError
 
 from dsl_core.errors import DslError, StoreError
 from dsl_core.io.atomic import make_folder, write_atomic
@@ -24,7 +25,7 @@ def write_record(path: Path, record: Record, *, overwrite: bool = False, sealed:
 
     It carries its checksum unless it is not ``sealed``, as a file for people to edit. Raises `StoreError`.
     """
-    text = record.model_dump_json(indent=1)
+    text = _json(path, record)
     return write_text(path, seal(text).decode() if sealed else f"{text}\n", overwrite=overwrite)
 
 
@@ -34,7 +35,17 @@ def replace_record(path: Path, record: Record) -> None:
     Raises `StoreError`.
     """
     make_folder(path.parent)
-    write_atomic(path, seal(record.model_dump_json(indent=1)))
+    write_atomic(path, seal(_json(path, record)))
+
+
+def _json(path: Path, record: Record) -> str:
+    try:
+        return record.model_dump_json(indent=1)
+    except PydanticSerializationError as error:
+        raise StoreError(
+            f"{path} cannot be written: it would name a file or folder whose name is not in UTF-8. Rename"
+            " that one and repeat the command."
+        ) from error
 
 
 def read_record(

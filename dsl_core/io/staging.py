@@ -138,7 +138,7 @@ def write_text(path: Path, text: str | Callable[[], str], *, overwrite: bool = F
     Text that takes long to make is given as a function, which is called once the path is known to be free.
     """
     with staged([path], overwrite=overwrite) as (draft,):
-        draft.write_bytes((text if isinstance(text, str) else text()).encode())
+        draft.write_bytes((text if isinstance(text, str) else text()).encode(errors="replace"))
     return path
 
 

@@ -29,6 +29,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, Shot, XorCode
 from dsl_core.model.result import Flag, build_result
 from dsl_core.model.rig import ProjectorResponse, Rig, Sensor
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.words import readable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,7 +101,7 @@ def import_pictures(
     if rig is not None:
         _require_sizes(source, rig)
     notes = {
-        "imported_from": root.absolute().name,
+        "imported_from": readable(root.absolute().name),
         FINGERPRINT: source.fingerprint(),
         MAPPING: mapping.model_dump_json(),
         SENSOR: sensor.model_dump_json(),

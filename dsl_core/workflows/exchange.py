@@ -20,7 +20,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.pipeline import scan
 from dsl_core.progress import Progress
-from dsl_core.words import quoted
+from dsl_core.words import quoted, readable
 from dsl_core.workflows.captures import FINGERPRINT, refuse_other_import
 from dsl_core.workflows.scans import calibration_of
 
@@ -112,7 +112,7 @@ def import_scan(
     source = open_dataset(root, bayer=calibration.sensor.bayer, bit_depth=calibration.sensor.bit_depth)
     if target is not None:
         source.require_frames()
-        notes = {"imported_from": root.absolute().name, FINGERPRINT: source.fingerprint()}
+        notes = {"imported_from": readable(root.absolute().name), FINGERPRINT: source.fingerprint()}
         refuse_other_import(target, f"the files of {root}", notes[FINGERPRINT], calibration)
         scan(replay_rig(source, calibration), source.plan, target, progress, notes, prove=False)
     return source.table

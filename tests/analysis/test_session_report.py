@@ -167,3 +167,10 @@ def test_a_missing_band_takes_no_mark_out_of_a_report() -> None:
     assert part.summary == whole.summary
     assert "nan" not in str(part.tables)
     assert all("nan" not in curve.line + curve.band for curve in part.curves)
+
+
+@pytest.mark.parametrize("ending", [".html", ".pdf"])
+def test_a_result_whose_name_is_not_in_utf_8_has_a_report(tmp_path: Path, ending: str) -> None:
+    content = session_content("B\udce4ume", chart_result(), Annotations())
+    assert content.title == "B\ufffdume"
+    assert write_report(content, tmp_path / f"r{ending}").exists()

@@ -74,3 +74,9 @@ def test_a_file_with_the_mark_that_windows_puts_first_is_read(tmp_path: Path) ->
     path = write_record(tmp_path / "plan.json", PLAN)
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
     assert read_record(path, CapturePlan) == PLAN
+
+
+def test_a_name_that_is_not_in_utf_8_is_told(tmp_path: Path) -> None:
+    plan = PLAN.model_copy(update={"name": "B\udce4ume"})
+    with pytest.raises(StoreError, match=r"plan\.json cannot be written: .* not in UTF-8\. Rename"):
+        write_record(tmp_path / "plan.json", plan)

@@ -344,3 +344,7 @@ def test_a_text_replaces_another_only_where_that_is_said(tmp_path: Path) -> None
         write_text(path, "second")
     assert path.read_text() == "first"
     assert write_text(path, lambda: "second", overwrite=True).read_text() == "second"
+
+
+def test_text_with_a_name_that_is_not_in_utf_8_is_written(tmp_path: Path) -> None:
+    assert write_text(tmp_path / "a.html", "B\udce4ume").read_text(encoding="utf-8") == "B?ume"

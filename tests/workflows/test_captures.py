@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -119,3 +121,10 @@ def test_columns_without_depth_are_exported_as_arrays(folder: Path, tmp_path: Pa
     files = export_npy(result, tmp_path / "a.npy")
     assert [file.name for file in files] == ["a_column.npy", "a_column_std.npy"]
     assert np.array_equal(np.load(files[0]), result["column_px"].values, equal_nan=True)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system has only names in UTF-8")
+def test_a_folder_whose_name_is_not_in_utf_8_is_imported(folder: Path, tmp_path: Path) -> None:
+    named = shutil.copytree(folder, tmp_path / "B\udce4ume")
+    captures.import_pictures(named, tmp_path / "a.dsl", MAPPING)
+    assert ScanReader(tmp_path / "a.dsl").manifest.notes["imported_from"] == "B\ufffdume"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -105,3 +106,10 @@ def test_an_interrupted_import_goes_on_also_from_a_folder_that_moved(tmp_path: P
     moved = Path(shutil.move(dataset, tmp_path / "archive"))
     exchange.import_scan(moved, session, RIG)
     assert _holds(session, 1)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system has only names in UTF-8")
+def test_a_dataset_whose_name_is_not_in_utf_8_is_imported(tmp_path: Path) -> None:
+    session = tmp_path / "scan.dsl"
+    exchange.import_scan(_dataset(tmp_path / "B\udce4ume", 1), session, RIG)
+    assert read_manifest(session).notes["imported_from"] == "B\ufffdume"

@@ -29,6 +29,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rendered_effects import RenderedEffects
 from dsl_core.model.result_order import columns_and_rows_px
 from dsl_core.optics.colour import hold_colour
+from dsl_core.words import readable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -270,7 +271,7 @@ def report_content(
     if effects is not None:
         del attributes["effects"]
     return ReportContent(
-        title,
+        readable(title),
         result,
         summary=summary,
         evaluation=evaluation,

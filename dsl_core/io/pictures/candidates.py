@@ -11,7 +11,7 @@ from pathlib import Path
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import picture_files
 from dsl_core.io.pictures.picture_file import ARRAYS, NOT_READ, PAGED, Picture, pictures_in
-from dsl_core.words import counted, natural
+from dsl_core.words import counted, natural, readable
 
 #: Fewer pictures are no code, more are several captures.
 FEWEST, MOST = 4, 512
@@ -66,9 +66,10 @@ def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
         by_folder.setdefault(path.relative_to(folder).parent.as_posix(), []).append(path)
     parts = list(by_folder.values()) if len(by_folder) > 1 else []
     parts += [g for g in groups.values() if len(groups) > 1 and g not in parts]
-    whole = [] if len(pictures) > MOST else list(_variants(folder, files, files, folder.absolute().name))
+    name = readable(folder.absolute().name)
+    whole = [] if len(pictures) > MOST else list(_variants(folder, files, files, name))
     for kept in _without_strays(files, groups.values()):
-        whole += _variants(folder, kept, files, folder.absolute().name)
+        whole += _variants(folder, kept, files, name)
     single = [
         candidate
         for group in sorted(parts, key=lambda g: natural(str(g[0])))

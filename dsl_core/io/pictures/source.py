@@ -15,6 +15,7 @@ from dsl_core.io.pictures.arrange import Arrangement, arrange
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.io.pictures.picture_file import DECODED_BITS, Picture, load_mosaic, load_values
 from dsl_core.model.plan import CapturePlan, NoSpectral, Setting, Shot
+from dsl_core.words import readable
 
 #: Nobody notes exposures next to pictures; ratios within a capture are all that decoding needs.
 EXPOSURE_MS = 1.0
@@ -82,7 +83,7 @@ def open_pictures(root: Path, mapping: Mapping) -> PictureScan:
     found = arrange(root, mapping)
     first = load_values(found.frames[0], mapping.raw)
     plan = CapturePlan(
-        name=mapping.name or root.absolute().name,
+        name=mapping.name or readable(root.absolute().name),
         camera_size_px=(first.shape[1], first.shape[0]),
         projector_size_px=mapping.projector_size_px,
         code=found.code,

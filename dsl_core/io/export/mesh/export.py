@@ -13,6 +13,7 @@ from dsl_core.io.export.mesh.surface import Surface, grid_of, png_bytes, surface
 from dsl_core.io.export.ply import write_mesh_ply
 from dsl_core.io.staging import staged
 from dsl_core.solve.many import Check, never
+from dsl_core.words import readable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +47,7 @@ def export_mesh(
     if ending == ".obj":
         return _write_obj(surface, path, origin, overwrite, check)
     content = (
-        glb_bytes(surface, path.stem, origin)
+        glb_bytes(surface, readable(path.stem), origin)
         if ending == ".glb"
         else stl_bytes(surface, origin.get("scan_id", ""))
     )

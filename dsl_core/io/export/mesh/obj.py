@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dsl_core.io.export.common import ascii_text
 from dsl_core.io.export.mesh.surface import Surface
 from dsl_core.solve.many import Check
+from dsl_core.words import readable
 
 #: Lines written between two checks.
 _LINES = 20_000
@@ -23,7 +24,7 @@ MATERIAL = "surface"
 
 def material_files(path: Path) -> list[Path]:
     """The files of material and texture; names without spaces, at which many readers end a name."""
-    stem = "_".join(path.stem.split())
+    stem = "_".join(readable(path.stem).split())
     return [path.with_name(f"{stem}.mtl"), path.with_name(f"{stem}.png")]
 
 

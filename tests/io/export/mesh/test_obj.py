@@ -71,3 +71,5 @@ def test_files_of_the_material_have_names_without_spaces() -> None:
     assert material_files(Path("a/my new scan.obj")) == [Path("a/my_new_scan.mtl"), Path("a/my_new_scan.png")]
     assert material_text("t.png").splitlines()[0] == "newmtl surface"
     assert "map_Kd t.png" in material_text("t.png")
+    # As text in the .obj and as a name on the disk alike.
+    assert material_files(Path("B\udce4ume.obj"))[0] == Path("B\ufffdume.mtl")
