@@ -106,8 +106,9 @@ def with_axes(result: xr.Dataset) -> xr.Dataset:
     What has other axes, such as one spectrum, keeps them.
     """
     result = _rising(with_bits(result), (BANDS,))
+    # Read first: xarray cannot pick single pixels from one that is turned before it is read.
     turned = {
-        name: variable.transpose(*VARIABLES[str(name)][0])
+        name: variable.compute().transpose(*VARIABLES[str(name)][0])
         for name, variable in result.data_vars.items()
         if name in VARIABLES
         and variable.dims != VARIABLES[str(name)][0]

@@ -88,6 +88,13 @@ def test_values_outside_the_integer_range_are_kept_as_float(tmp_path: Path, name
     np.testing.assert_array_equal(loaded[name], result[name])
 
 
+def test_a_pixel_is_read_from_a_result_with_other_axes(tmp_path: Path) -> None:
+    usual, kept = small_result(), {"x": 2, "y": 1}
+    there = load_result(save_result(usual, tmp_path / "usual.zarr")).isel(kept)
+    turned = load_result(save_result(usual.transpose(..., "y"), tmp_path / "turned.zarr")).isel(kept)
+    xr.testing.assert_identical(turned.load(), there.load())
+
+
 def test_a_cube_of_nothing_but_nan_stays_nan(tmp_path: Path) -> None:
     result = small_result()
     result["reflectance"][...] = np.nan
