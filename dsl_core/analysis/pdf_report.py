@@ -38,9 +38,12 @@ def write_pdf(content: ReportContent, path: Path, *, overwrite: bool = False) ->
         # A name in a script that the font lacks shows boxes; that is no reason to have no report.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
         details = {"Title": content.title, "Creator": "dsl-scan", "CreationDate": None}
-        with PdfPages(draft, metadata=details) as pdf:
+        # In memory: it says badly that a disk is full, and keeps the file open.
+        drawn = BytesIO()
+        with PdfPages(drawn, metadata=details) as pdf:
             for page in _pages(content):
                 pdf.savefig(page)
+        draft.write_bytes(drawn.getbuffer())
     return path
 
 

@@ -174,3 +174,16 @@ def test_a_result_whose_name_is_not_in_utf_8_has_a_report(tmp_path: Path, ending
     content = session_content("B\udce4ume", chart_result(), Annotations())
     assert content.title == "B\ufffdume"
     assert write_report(content, tmp_path / f"r{ending}").exists()
+
+
+def test_a_report_on_a_disk_that_fills_up_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource", reason="the system limits no files")
+    content = session_content("full", chart_result(), Annotations())
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    try:
+        with pytest.raises(StoreError, match="could not be written"):
+            write_report(content, tmp_path / "r.pdf")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list(tmp_path.iterdir()) == []
