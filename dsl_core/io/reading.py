@@ -10,7 +10,7 @@ import stat
 import tokenize
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import FileIO, RawIOBase
+from io import BytesIO, FileIO, RawIOBase
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: More than any plan, rig or campaign file of this program holds.
 MOST_BYTES = 64 << 20
+#: The most that the first version of NumPy's format can have.
+_MOST_HEADER_BYTES = 1 << 16
 
 
 def there(path: Path) -> bool:
@@ -109,7 +111,11 @@ def array_header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
         version = np.lib.format.read_magic(file)
         is_first = version == (1, 0)
         read = np.lib.format.read_array_header_1_0 if is_first else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read(file)
+        length = file.read(2 if is_first else 4)
+        count = int.from_bytes(length, "little")
+        if count > _MOST_HEADER_BYTES:  # of zeros, it may be packed in little
+            raise ValueError(f"its header declares {count} bytes, which no header needs")
+        shape, _, dtype = read(BytesIO(length + file.read(count)))
     except (SyntaxError, TypeError, tokenize.TokenError, OverflowError) as error:
         # NumPy parses the header as Python, and lets out what the parser says.
         raise ValueError(f"its header is damaged ({type(error).__name__})") from error

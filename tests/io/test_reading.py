@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from pathlib import Path
 
 import pytest
 
-from dsl_core.io.reading import parts_of, read_bounded, read_json, require_plain
+from dsl_core.io.reading import array_header, parts_of, read_bounded, read_json, require_plain
 
 
 def test_plain_files_and_links_to_them_are_read(tmp_path: Path) -> None:
@@ -57,3 +58,11 @@ def test_parts_of_a_file_are_those_bytes(tmp_path: Path) -> None:
         assert content[20:10] == b""
     with pytest.raises(OSError, match="larger than"), parts_of(path, 100):
         pass
+
+
+def test_a_header_that_no_array_needs_is_not_read() -> None:
+    size = 10**9
+    file = io.BytesIO(b"\x93NUMPY\x02\x00" + size.to_bytes(4, "little") + bytes(1 << 20))
+    with pytest.raises(ValueError, match="its header declares 1000000000 bytes"):
+        array_header(file)
+    assert file.tell() == 12
