@@ -53,6 +53,16 @@ def columns_and_rows_px(result: xr.Dataset) -> tuple[NDArray[np.int64], NDArray[
     )
 
 
+def require_wavelengths(nm: ArrayLike, result: object) -> None:
+    """Raise `StoreError` where the bands of a result, called ``result``, have not one wavelength each."""
+    values = np.asarray(nm, np.float64)
+    if not values.size or not np.isfinite(values).all() or len(np.unique(values)) < values.size:
+        raise StoreError(
+            f"{result} has a reflectance, but not one wavelength for each of its bands. Add the coordinate"
+            f" {BANDS}, in nm."
+        )
+
+
 def rising_order(values: ArrayLike) -> NDArray[np.intp] | None:
     """The order (n,) in which values rise; None where they do already, or are no finite numbers.
 

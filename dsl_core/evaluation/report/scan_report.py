@@ -27,7 +27,7 @@ from dsl_core.model.calibration.accepted import MISSED_ATTRIBUTE, read_missed
 from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rendered_effects import RenderedEffects
-from dsl_core.model.result_order import columns_and_rows_px
+from dsl_core.model.result_order import BANDS, columns_and_rows_px, require_wavelengths
 from dsl_core.optics.colour import hold_colour
 from dsl_core.words import readable
 
@@ -260,7 +260,12 @@ def report_content(
     summary: str = "",
     goals: dict[str, Goal] | None = None,
 ) -> ReportContent:
-    """What the report of a result says; plan and costs come from the result's attributes."""
+    """What the report of a result says; plan and costs come from the result's attributes.
+
+    Raises `StoreError` where it has a reflectance, but not a wavelength for each band.
+    """
+    if "reflectance" in result:
+        require_wavelengths(result.coords.get(BANDS, ()), title)
     attributes = dict(result.attrs)
     costs, plan = costs_of(attributes), plan_of(attributes)
     fit = Fit.read(attributes)

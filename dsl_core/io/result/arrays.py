@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,7 +75,7 @@ def new_array(
         shards=(*bands, *plane) if bands else None,
         compressors=[BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle"), Crc32cCodec()],
         dimension_names=[str(d) for d in like.dims],
-        attributes={**{str(k): plain(v) for k, v in like.attrs.items()}, **encoding},
+        attributes={**plain(like.attrs), **encoding},
         config={"write_empty_chunks": True},
     )
 
@@ -111,6 +115,18 @@ def pack(values: NDArray[Any], packing: Packing) -> NDArray[Any]:
     return packed
 
 
-def plain(value: object) -> Any:
-    """A value that JSON can hold."""
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+def plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Attributes as JSON can hold them; raises `StoreError` that names one that it cannot."""
+    found = {
+        str(name): value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+        for name, value in attributes.items()
+    }
+    for name, value in found.items():
+        try:
+            json.dumps(value)
+        except (TypeError, ValueError) as error:
+            raise StoreError(
+                f"The attribute {name!r} of the result cannot be stored ({error}). Make it a text, such as"
+                " str(value), or a number."
+            ) from error
+    return found

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
 from dsl_core.model.result import VARIABLES
-from dsl_core.model.result_order import BANDS, as_bits, places_px, rising_order
+from dsl_core.model.result_order import BANDS, as_bits, places_px, require_wavelengths, rising_order
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
@@ -144,12 +144,8 @@ def _ordered(found: Mapping[str, StoredArray], path: Path) -> tuple[NDArray[np.f
                 " the result was made."
             )
     nm = np.asarray(_coordinate(found, BANDS), np.float64)
-    is_named = nm.size and np.isfinite(nm).all() and len(np.unique(nm)) == nm.size
-    if "reflectance" in found and not is_named:
-        raise StoreError(
-            f"{path} has a reflectance, but not one wavelength for each of its bands. Add the coordinate"
-            " wavelength_nm, in nm."
-        )
+    if "reflectance" in found:
+        require_wavelengths(nm, path)
     orders = {
         axis: order
         for axis in (BANDS, "x", "y")

@@ -49,9 +49,14 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
         raise StoreError(
             f"{path}: the dataset has no pixels, as a single spectrum has none. Export it as a table (.csv)."
         )
+    if empty := [str(axis) for axis, size in result.sizes.items() if not size]:
+        raise StoreError(
+            f"{path}: the dataset is empty along {' and '.join(empty)}. Keep at least one value of each axis."
+        )
     import zarr
 
-    result = with_bits(result)
+    # What no file can hold is told before anything is written.
+    result = with_bits(result).assign_attrs(plain(result.attrs))
     with staged([path], overwrite=overwrite, kind=RESULT_FOLDER) as (draft,):
         group = zarr.create_group(draft, zarr_format=3)
         labels = labels_of(result)
@@ -73,7 +78,7 @@ def seal_folder(folder: Path, attributes: Mapping[Any, Any]) -> None:
     from zarr.errors import ZarrUserWarning
 
     group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
-    group.attrs.put({str(key): plain(value) for key, value in attributes.items()})
+    group.attrs.put(plain(attributes))
     group.update_attributes(with_inventory(folder, dict(group.attrs)))
     with warnings.catch_warnings():
         # The arrays' metadata at the root, where other readers look for them first. Not yet in the

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,22 @@ def test_a_pixel_is_read_from_a_result_with_other_axes(tmp_path: Path) -> None:
     there = load_result(save_result(usual, tmp_path / "usual.zarr")).isel(kept)
     turned = load_result(save_result(usual.transpose(..., "y"), tmp_path / "turned.zarr")).isel(kept)
     xr.testing.assert_identical(turned.load(), there.load())
+
+
+@pytest.mark.parametrize("value", [datetime(2026, 1, 1, tzinfo=UTC), Path("a"), b"a", {1}])
+@pytest.mark.parametrize("on", ["result", "variable"])
+def test_an_attribute_that_no_file_can_hold_is_named(tmp_path: Path, value: object, on: str) -> None:
+    result = small_result()
+    (result if on == "result" else result["depth_mm"]).attrs["mine"] = value
+    with pytest.raises(StoreError, match=r"attribute 'mine' of the result cannot be stored .* not JSON"):
+        save_result(result, tmp_path / "a.zarr")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("axis", ["wavelength_nm", "x"])
+def test_a_result_of_nothing_is_not_stored(tmp_path: Path, axis: str) -> None:
+    with pytest.raises(StoreError, match=f"is empty along {axis}"):
+        save_result(small_result().isel({axis: slice(0, 0)}), tmp_path / "a.zarr")
 
 
 def test_a_cube_of_nothing_but_nan_stays_nan(tmp_path: Path) -> None:
