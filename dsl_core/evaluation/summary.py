@@ -14,6 +14,7 @@ from dsl_core.evaluation.depth import DepthScore, depth_score
 from dsl_core.evaluation.scatter import std_of_mean, std_of_rms
 from dsl_core.evaluation.spectral import Peak, SpectralErrors, known_of_first, peak_width, spectral_errors
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, HonestyCheck, check_honesty
+from dsl_core.model.result_order import BANDS, require_wavelengths
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -140,11 +141,13 @@ class Evaluation:
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
     """Compare a result with what is known; parts without truth or measurement are left out.
 
-    Raises `DecodeError` when truth and result have different sizes or no lit pixel was measured.
+    Raises `DecodeError` when truth and result have different sizes or no lit pixel was measured, and
+    `StoreError` where a band of spectra that are compared has no wavelength of its own.
     """
     depth, depth_calibration = _depth(result, truth)
     if truth.material is None or truth.spectra is None or "reflectance" not in result:
         return Evaluation(depth, depth_calibration, (), (), None)
+    require_wavelengths(result.coords.get(BANDS, ()), "The result")
     chosen = _chosen(result, truth.material, truth.lit)
     samples = [
         _Sample.take(result, chosen & (truth.material == index), truth.names[index], truth.spectra[index])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dsl_core.errors import DecodeError
+from dsl_core.errors import DecodeError, StoreError
 from dsl_core.evaluation.report.scan_report import _patch_note
 from dsl_core.evaluation.summary import Evaluation, Truth, evaluate, interior
 from dsl_core.evaluation.time_sweep import point_against_truth
@@ -152,3 +152,9 @@ def test_bands_that_hold_too_little_of_a_colour_have_no_colour_difference(known:
     assert "delta_e" not in deviations(found)
     assert not any("CIEDE2000" in row.figure for row in verdicts(found))
     assert _patch_note(found.patches[0]) == f"RMSE {found.patches[0].rmse:.3f}"
+
+
+def test_spectra_without_wavelengths_of_their_own_are_not_judged(known: Any) -> None:
+    same = known.result.assign_coords(wavelength_nm=np.full(known.result.sizes["wavelength_nm"], 500.0))
+    with pytest.raises(StoreError, match="not one wavelength for each of its bands"):
+        evaluate(same, known.truth)
