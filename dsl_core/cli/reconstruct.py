@@ -263,9 +263,8 @@ def _runner(jobs: int, scheduler: str | None) -> Runner:
 
         require_package("distributed")
         return Cluster(scheduler)
-    import psutil
-
+    from dsl_core.solve.limits import free_memory_bytes
     from dsl_core.workflows.batch.batch import needed_bytes
     from dsl_core.workflows.batch.processes import Processes
 
-    return Processes(jobs, MEMORY_SHARE * psutil.virtual_memory().available, needed_bytes)
+    return Processes(jobs, MEMORY_SHARE * free_memory_bytes(), needed_bytes)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from pydantic import ValidationError
-from pydantic_core import PydanticSerializationError
 
 from dsl_core.errors import DslError, StoreError
 from dsl_core.io.atomic import make_folder, write_atomic
@@ -41,7 +40,7 @@ def replace_record(path: Path, record: Record) -> None:
 def _json(path: Path, record: Record) -> str:
     try:
         return record.model_dump_json(indent=1)
-    except PydanticSerializationError as error:
+    except ValueError as error:
         raise StoreError(
             f"{path} cannot be written: it would name a file or folder whose name is not in UTF-8. Rename"
             " that one and repeat the command."

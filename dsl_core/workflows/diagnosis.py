@@ -14,6 +14,7 @@ from pathlib import Path
 
 from dsl_core.extras import EXTRA_OF
 from dsl_core.resources import expanded
+from dsl_core.solve.limits import free_memory_bytes, usable_cores
 from dsl_core.version import __version__
 
 #: Draws and lists screens in a process of its own; named, as the engine imports no window.
@@ -43,7 +44,7 @@ def diagnosis(folder: Path, with_devices: bool = True) -> Iterator[tuple[str, st
     yield "dsl-scan", f"{__version__}, {_home_as_tilde(str(Path(__file__).parents[2]))}"
     yield "Python", f"{platform.python_version()}, {_home_as_tilde(sys.executable)}"
     yield "system", f"{platform.system()} {platform.release()}, {platform.machine()}{_distribution()}"
-    yield "processor", f"{os.cpu_count()} cores"
+    yield "processor", f"{os.cpu_count()} cores, {usable_cores()} for this program"
     yield "memory", _memory()
     yield "disk", f"{shutil.disk_usage(folder).free / 1e9:.1f} GB free where this was asked"
     for name in (*_PACKAGES, *_OF_EXTRAS, *_DRIVERS):
@@ -71,8 +72,8 @@ def _distribution() -> str:
 def _memory() -> str:
     import psutil
 
-    memory = psutil.virtual_memory()
-    return f"{memory.available / 1e9:.1f} GB free of {memory.total / 1e9:.1f} GB"
+    total = psutil.virtual_memory().total
+    return f"{free_memory_bytes() / 1e9:.1f} GB free for this program of {total / 1e9:.1f} GB"
 
 
 def _card() -> str:

@@ -126,7 +126,7 @@ def plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
             json.dumps(value)
         except (TypeError, ValueError) as error:
             raise StoreError(
-                f"The attribute {name!r} of the result cannot be stored ({error}). Make it a text, such as"
+                f"The attribute {name!r} of the result cannot be saved ({error}). Make it a text, such as"
                 " str(value), or a number."
             ) from error
     return found

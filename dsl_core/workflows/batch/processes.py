@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from dsl_core.solve.heap import keep_freed_memory
+from dsl_core.solve.limits import usable_cores
 from dsl_core.solve.threads import share_cores
 from dsl_core.workflows.batch.runner import MOST_DEATHS, Ended, Rows, given_up
 from dsl_core.workflows.batch.task import ScanTask, SeenRows, do_task
@@ -43,7 +44,7 @@ class Processes:
         work: Work = do_task,
     ) -> None:
         self._jobs, self._memory_bytes, self._needs_bytes, self._work = jobs, memory_bytes, needs_bytes, work
-        self._threads = max((os.cpu_count() or 1) // jobs, 1)
+        self._threads = max(usable_cores() // jobs, 1)
 
     def run(self, tasks: Mapping[int, ScanTask]) -> Generator[Rows | Ended, None, None]:
         """Do tasks; one whose process dies is done again, by another process, a few times."""

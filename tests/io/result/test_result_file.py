@@ -101,7 +101,7 @@ def test_a_pixel_is_read_from_a_result_with_other_axes(tmp_path: Path) -> None:
 def test_an_attribute_that_no_file_can_hold_is_named(tmp_path: Path, value: object, on: str) -> None:
     result = small_result()
     (result if on == "result" else result["depth_mm"]).attrs["mine"] = value
-    with pytest.raises(StoreError, match=r"attribute 'mine' of the result cannot be stored .* not JSON"):
+    with pytest.raises(StoreError, match=r"attribute 'mine' of the result cannot be saved .* not JSON"):
         save_result(result, tmp_path / "a.zarr")
     assert list(tmp_path.iterdir()) == []
 

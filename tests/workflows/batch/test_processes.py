@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from dsl_core.solve import limits
 from dsl_core.workflows.batch.processes import Processes
 from dsl_core.workflows.batch.runner import MOST_DEATHS, Ended, Rows
 from dsl_core.workflows.batch.task import Outcome, ScanTask
@@ -58,7 +60,9 @@ def test_tasks_wait_for_memory_but_one_always_runs(tmp_path: Path, memory: float
 
 def test_kernels_share_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("OMP_NUM_THREADS")
-    monkeypatch.setattr("os.cpu_count", lambda: 8)
+    # Those that this process may use.
+    monkeypatch.setattr(limits, "_OWN", tmp_path / "none")
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(8)), raising=False)
     found = outcomes(Processes(2, work=work.meets_others), tasks_in(tmp_path, "a"))
     assert found[0].sentence == "4"
 
