@@ -179,10 +179,12 @@ class RowWriter:
         """Move the result to its place, whole or not at all, with its attributes; raises `StoreError`."""
         with self._writing():
             seal_folder(self.work / _ARRAYS, {**attributes, "labels": self._labels})
-            place = self._target
-            put_in_place(self.work / _ARRAYS, place, overwrite=self._overwrite, kind=RESULT_FOLDER)
-        # Not before the result is there; what a kill leaves has no arrays, and is made anew.
-        self._tidy()
+            arrays, place = self.work / _ARRAYS, self._target
+            try:
+                put_in_place(arrays, place, overwrite=self._overwrite, kind=RESULT_FOLDER)
+            finally:
+                if not arrays.is_dir():  # the result is in its place, and there is nothing to resume
+                    self._tidy()
         return self._target
 
     def __enter__(self) -> Self:
