@@ -66,9 +66,7 @@ def test_another_calibration_is_never_dropped_without_a_word(folder: Path, tmp_p
     other = rig.model_copy(update={"white_scale": 3.0})
     with pytest.raises(StoreError, match=r"with another calibration.*another name, or give this calibration"):
         captures.import_pictures(folder, target, MAPPING, other)
-    with pytest.raises(
-        StoreError, match=r"with a calibration\. .* choose another name\.$"
-    ):
+    with pytest.raises(StoreError, match=r"with a calibration\. .* choose another name\.$"):
         captures.import_pictures(folder, target, MAPPING)
     with pytest.raises(StoreError, match="imported without a calibration"):
         captures.import_pictures(folder, tmp_path / "none.dsl", MAPPING, rig)
