@@ -27,6 +27,7 @@ from dsl_core.errors import DeviceError, DriftError, DslError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.scan.origin import rig_notes
+from dsl_core.model.plan import CapturePlan
 from dsl_core.words import quoted
 
 _PHASES = {State.RUNNING: Phase.RUNNING, State.PAUSED: Phase.PAUSED, State.CANCELLING: Phase.STOPPING}
@@ -66,6 +67,8 @@ class ScanController:
         self._reconnector = Reconnector(state, rig, notifier, self.start)
         self._scan: ScanJob | None = None
         self._job: Job[Status] | None = None
+        #: The plan from before an interrupted scan, which has its own, and the file that holds it.
+        self._plan_before: tuple[CapturePlan, Path | None] | None = None
 
     # Run -------------------------------------------------------------------------------------------
 
@@ -210,18 +213,15 @@ class ScanController:
 
     def _finished(self, status: Status) -> None:
         folder = self._end(Phase.DONE)
-        self.state.interrupted.set(None)
         self.state.finished.set(folder)
-        self.state.check_drift.set(True)
         assert self._scan is not None
         lacks_calibration = not self._scan.is_calibrated
         self.state.lacks_calibration.set(lacks_calibration)
         what_next = f" {self._needs_calibration}" if lacks_calibration else ""
         self.state.note.set(f"All {status.total} frames are saved in {folder}.{what_next}")
-        self._choose_target()
-        self.plans.refresh()
         if self.state.then_reconstruct.value and not lacks_calibration:
             self.reconstruct(folder)
+        self._plan_next()
 
     @property
     def _needs_calibration(self) -> str:
@@ -340,6 +340,8 @@ class ScanController:
         missing, total = len(reader.missing()), reader.plan.shot_count
         if not missing:
             return False
+        if self.state.interrupted.value is None:
+            self._plan_before = self.state.plan.value, self.state.plan_file.value
         self.plans.take_plan(reader.plan)
         self.state.target.set(folder)
         self.state.interrupted.set(
@@ -353,12 +355,23 @@ class ScanController:
         if self.state.phase.value.is_busy:
             return
         self._reconnector.forget()
-        self.state.interrupted.set(None)
-        self.state.check_drift.set(True)
         self.state.phase.set(Phase.PLANNING)
         self.state.trouble.set("")
         self.state.note.set("")
+        self._plan_next()
+
+    def _plan_next(self) -> None:
+        """Leave a scan that is complete or interrupted, whose plan makes way for the one from before it."""
+        self.state.interrupted.set(None)
+        self.state.check_drift.set(True)
         self._choose_target()
+        before, self._plan_before = self._plan_before, None
+        if before is None:
+            self.plans.refresh()
+            return
+        self.state.plan.set(before[0])
+        self.state.plan_file.set(before[1])
+        # Another rig may have been connected since.
         self.plans.take_rig()
 
     def command_line(self) -> str:

@@ -14,7 +14,6 @@ from dsl_app.scan.controls import frame_text
 from dsl_app.scan.state import LivePicture, ScanState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.forms import label, named, show_parts
-from dsl_core.model.plan import CapturePlan
 
 #: Width and height of the pattern, px: as wide as the column, and so low that the smallest window has no need
 #: to scroll; lines are upright.
@@ -50,17 +49,17 @@ class FrameBox(QGroupBox):
     def _show_picture(self, shown: LivePicture | None) -> None:
         self.setVisible(shown is not None)
         if shown is not None:
-            self.pattern.setPixmap(_pixmap(pattern_levels(self._state.plan.value, shown)))
+            self.pattern.setPixmap(_pixmap(pattern_levels(shown)))
 
     def _show_text(self) -> None:
         show_parts(self, frame_text(self._state.status.value, self._state.picture.value))
 
 
-def pattern_levels(plan: CapturePlan, shown: LivePicture) -> NDArray[np.uint8]:
+def pattern_levels(shown: LivePicture) -> NDArray[np.uint8]:
     """The projected pattern of a frame as RGB (rows, columns, 3), its brightest level at 255."""
     from dsl_core.patterns.images import pattern_image
 
-    return pattern_image(plan, replace(plan.original(shown.shot), level=1.0))
+    return pattern_image(shown.plan, replace(shown.plan.original(shown.shot), level=1.0))
 
 
 def _pixmap(levels: NDArray[np.uint8]) -> QPixmap:

@@ -90,7 +90,7 @@ class ScanJob:
         bayer, full_dn = devices.camera.info.bayer, full_scale_dn(devices)
         with pipeline.open_scan(
             devices, plan, request.folder, progress, notes, self.token,
-            lambda shot, frame: self._watch(shot, frame, bayer, full_dn),
+            lambda shot, frame: self._watch(plan, shot, frame, bayer, full_dn),
             prove=not request.is_resumed or request.check_drift, waits=True,
         ) as runner:  # fmt: skip
             runner.listen(self._listen)
@@ -133,7 +133,9 @@ class ScanJob:
             progress.report("read saved frames", done, len(there))
             graphs.add(shot, reader.read(shot))
 
-    def _watch(self, shot: Shot, frame: Frame, bayer: BayerPattern, full_scale_dn: int) -> None:
+    def _watch(
+        self, plan: CapturePlan, shot: Shot, frame: Frame, bayer: BayerPattern, full_scale_dn: int
+    ) -> None:
         assert self._graphs is not None
         self._graphs.add(shot, frame.pixels)
         if self._picture is not None:
@@ -142,7 +144,7 @@ class ScanJob:
         thin = -(-picture.shape[1] // PICTURE_CELLS)
         with self._lock:
             self._picture = LivePicture(
-                shot, picture[::thin, ::thin], 2 * thin, *_exposed(frame, full_scale_dn)
+                plan, shot, picture[::thin, ::thin], 2 * thin, *_exposed(frame, full_scale_dn)
             )
 
     def _listen(self, status: Status) -> None:

@@ -129,11 +129,12 @@ class Facts:
 
 @dataclass(frozen=True)
 class LivePicture:
-    """The last frame as RGB, one pixel for ``cell_px`` camera pixels.
+    """The last frame of a ``plan`` as RGB, one pixel for ``cell_px`` camera pixels.
 
     ``brightest`` is what its brightest pixels reach of full scale, ``saturated`` the share of pixels there.
     """
 
+    plan: CapturePlan
     shot: Shot
     picture: NDArray[np.uint8]
     cell_px: int

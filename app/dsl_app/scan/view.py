@@ -59,8 +59,8 @@ class FramePicture(QWidget):
         column_of((self.view, 1), self._text, on=self, margins=0, spacing=4)
         self._mouse = pg.SignalProxy(self.view.scene().sigMouseMoved, rateLimit=30, slot=self._hover)
 
-    def show_picture(self, shown: LivePicture | None, plan: CapturePlan) -> None:
-        """Show a frame of a plan."""
+    def show_picture(self, shown: LivePicture | None) -> None:
+        """Show a frame."""
         before, self._shown = self._shown, shown
         if shown is None:
             self.view.image.clear()
@@ -68,7 +68,8 @@ class FramePicture(QWidget):
             return
         self.view.image.setImage(shown.picture, autoLevels=False, levels=None)
         self.view.image.setRect(0, 0, *covered_px(shown))
-        self._text.setText(f"Frame {shown.shot.number} of {plan.shot_count}: {words_of(shown.shot, plan)}")
+        place = f"Frame {shown.shot.number} of {shown.plan.shot_count}"
+        self._text.setText(f"{place}: {words_of(shown.shot, shown.plan)}")
         if before is None or covered_px(before) != covered_px(shown):
             self.view.fit()
 
@@ -134,7 +135,7 @@ class ScanView(QSplitter):
             self.setStretchFactor(self.count() - 1, stretch)
         self.picture.pointed.connect(controller.point_at)
         self.stops = [
-            state.picture.follow(lambda shown: self.picture.show_picture(shown, state.plan.value)),
+            state.picture.follow(self.picture.show_picture),
             state.depth.follow(lambda depth: self._show_depth(state, depth)),
             state.cursor.follow(self.picture.show_cursor),
             state.graph.follow(self.graph.show_graph),
@@ -145,7 +146,7 @@ class ScanView(QSplitter):
         if depth_mm is not None:
             self.picture.show_depth(depth_mm)
         else:
-            self.picture.show_picture(state.picture.value, state.plan.value)
+            self.picture.show_picture(state.picture.value)
 
 
 class GraphPlot(QWidget):

@@ -468,6 +468,49 @@ def test_leaving_a_session_plans_a_new_one(
     assert (tmp_path / "first.dsl").is_dir()
 
 
+@pytest.mark.parametrize("completes", [False, True])
+def test_exposures_measured_for_a_scan_that_stopped_are_not_those_of_the_next(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, completes: bool
+) -> None:
+    exposed = bench.state.plan.value
+    monkeypatch.setattr(pipeline, "meter", lambda *asked: Metered(exposed, "Exposures are shortened.", True))
+    bench.plan(SHORT)
+    preset = bench.state.plan.value
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    assert bench.state.plan.value == exposed
+    if completes:
+        bench.scans.start()
+        assert phase(bench) is Phase.DONE
+    else:
+        bench.scans.plan_new_scan()
+    assert bench.state.plan.value == preset
+    assert is_metered(bench)
+
+
+def test_scans_that_are_opened_leave_the_plan_of_a_person_for_the_next(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    shutil.copytree(tmp_path / "first.dsl", tmp_path / "second.dsl")
+    bench.scans.plan_new_scan()
+    own = SHORT.model_copy(update={"spectral": LineComb(period_px=32)})
+    bench.scans.plans.change_plan(own)
+    bench.state.plan_file.set(tmp_path / "own.json")
+    for name in ("first", "second"):
+        assert bench.scans.open(tmp_path / f"{name}.dsl")
+        assert len(bench.state.plan.value.settings) == 1
+    bench.rig.connect(SMALL)
+    bench.scans.plan_new_scan()
+    assert bench.state.plan.value.spectral == own.spectral
+    assert bench.state.plan.value.camera_size_px == (32, 24)
+    bench.undo.undo()
+    assert len(bench.state.plan.value.settings) == 1
+
+
 def test_a_full_disk_is_said_before_the_start(bench: ScanBench, monkeypatch: pytest.MonkeyPatch) -> None:
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10, 9, 1))

@@ -110,7 +110,9 @@ def test_the_banner_of_a_scan_that_saved_nothing_starts_it_again() -> None:
 
 def test_the_last_frame_tells_its_exposure_its_pace_and_what_came_twice() -> None:
     shot = next(iter(PRESETS[0].plan.shots()))
-    shown = LivePicture(shot, np.zeros((2, 2, 3), np.uint8), 2, brightest=0.62, saturated=0.014)
+    shown = LivePicture(
+        PRESETS[0].plan, shot, np.zeros((2, 2, 3), np.uint8), 2, brightest=0.62, saturated=0.014
+    )
     half = Status(State.RUNNING, done=38, total=78, elapsed_s=20.0, remaining_s=20.0, corrected=2)
     said = frame_text(half, shown)
     assert [each.text for each in (said.brightest, said.saturated, said.each, said.again)] == [

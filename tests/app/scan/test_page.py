@@ -462,8 +462,8 @@ def test_a_scan_of_another_picture_size_fills_the_view(qtbot: QtBot) -> None:
     picture.show()
     shot = next(iter(SHORT.shots()))
     for width, height, cell_px in ((48, 32, 2), (600, 400, 2), (600, 400, 4), (30, 20, 2)):
-        seen = LivePicture(shot, np.zeros((height, width, 3), np.uint8), cell_px)
-        picture.show_picture(seen, SHORT)
+        seen = LivePicture(SHORT, shot, np.zeros((height, width, 3), np.uint8), cell_px)
+        picture.show_picture(seen)
         view = picture.box.viewRect()
         assert view.contains(QRectF(0, 0, width * cell_px, height * cell_px))
         assert view.height() < 1.2 * height * cell_px
@@ -476,18 +476,17 @@ def test_the_pattern_beside_a_frame_is_that_of_its_shot_as_bright_as_can_be() ->
     lines, white, repeated = (
         next(each for each in shots if each.role == role) for role in ("spectral", "white", "sentinel")
     )
-    drawn = [pattern_levels(SHORT, LivePicture(shot, picture, 2)) for shot in (lines, white, repeated)]
+    drawn = [pattern_levels(LivePicture(SHORT, shot, picture, 2)) for shot in (lines, white, repeated)]
     assert [(levels.min(), levels.max()) for levels in drawn[:2]] == [(0, 255), (255, 255)]
-    np.testing.assert_array_equal(
-        drawn[2], pattern_levels(SHORT, LivePicture(SHORT.original(repeated), picture, 2))
-    )
+    original = LivePicture(SHORT, SHORT.original(repeated), picture, 2)
+    np.testing.assert_array_equal(drawn[2], pattern_levels(original))
 
 
 def test_arrow_keys_come_back_into_a_smaller_picture(qtbot: QtBot) -> None:
     picture = FramePicture()
     qtbot.addWidget(picture)
     shot = next(iter(SHORT.shots()))
-    picture.show_picture(LivePicture(shot, np.zeros((20, 30, 3), np.uint8), 2), SHORT)
+    picture.show_picture(LivePicture(SHORT, shot, np.zeros((20, 30, 3), np.uint8), 2))
     picture.show_cursor((500, 10))
     with qtbot.waitSignal(picture.pointed) as pointed:
         QTest.keyClick(picture, Qt.Key.Key_Left)
