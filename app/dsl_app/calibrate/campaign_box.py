@@ -125,7 +125,7 @@ class CampaignBox(QFrame):
         self.cancel.clicked.connect(commands.cancel_everything)
         self.keep.clicked.connect(commands.keep)
         shown = (state.campaign, state.everything, state.outcome, state.refused, state.rows, state.foreign)
-        self.stops = follow_any(self._show, *shown, state.library, state.in_use, self._rig.devices)
+        self.stops = follow_any(self._show, *shown, state.library, state.in_use, self._rig.usable)
 
     def ask_new(self) -> bool:
         """Ask for a new campaign; whether one was begun."""
@@ -147,4 +147,4 @@ class CampaignBox(QFrame):
             self._commands.open_campaign(path)
 
     def _show(self) -> None:
-        show_parts(self, campaign_head(self._state, self._rig.devices.value))
+        show_parts(self, campaign_head(self._state, self._rig.usable.value))

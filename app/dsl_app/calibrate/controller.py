@@ -54,7 +54,7 @@ class CalibrateController:
         #: Holds the lock of the campaign that is written; a second release does nothing.
         self._lock = ExitStack()
         self._stops = [
-            rig.state.devices.changed.connect(lambda _: self.refresh()),
+            rig.state.usable.changed.connect(lambda _: self.refresh()),
             rig.state.choice.changed.connect(lambda _: self.refresh()),
         ]
         self._everything = CalibrateAll(
@@ -101,7 +101,7 @@ class CalibrateController:
 
     def refresh(self) -> None:
         """Read the state of every calibration again."""
-        facts, devices = self.state.campaign.value, self._rig.state.devices.value
+        facts, devices = self.state.campaign.value, self._rig.state.usable.value
         self.state.foreign.set(facts is not None and devices is not None and not self._fits(facts))
         self.state.trouble.set(self._obstacle())
         if facts is None:
@@ -184,7 +184,7 @@ class CalibrateController:
 
     def run_everything(self) -> None:
         """Run all calibrations in order where the rig places its targets; continues where it stopped."""
-        facts, devices = self._ready(), self._rig.state.devices.value
+        facts, devices = self._ready(), self._rig.state.usable.value
         if facts is None or devices is None:
             return
         if devices.place is None:
@@ -220,7 +220,7 @@ class CalibrateController:
 
     def keep(self) -> None:
         """Assemble the rig of everything accepted so far and keep it in the library."""
-        facts, devices = self._ready(), self._rig.state.devices.value
+        facts, devices = self._ready(), self._rig.state.usable.value
         if facts is None or devices is None:
             return
 
@@ -253,7 +253,7 @@ class CalibrateController:
 
     def _obstacle(self) -> str:
         """Why nothing can be calibrated now, empty if it can."""
-        facts, devices = self.state.campaign.value, self._rig.state.devices.value
+        facts, devices = self.state.campaign.value, self._rig.state.usable.value
         if facts is None:
             return ""
         if devices is not None and not self._fits(facts):

@@ -117,7 +117,7 @@ class LibraryController:
     @property
     def must_be_placed(self) -> bool:
         """Whether a person has to place the target of a drift check."""
-        devices = self._rig.state.devices.value
+        devices = self._rig.state.usable.value
         return devices is not None and devices.place is None
 
     def check(self, key: str, spectralon: bool = True, override: bool = False) -> None:
@@ -126,7 +126,7 @@ class LibraryController:
         Where camera or projector have other settings than in the calibration, the person is offered to check
         anyway (``override``).
         """
-        devices = self._rig.state.devices.value
+        devices = self._rig.state.usable.value
         if devices is None:
             self._notifier.tell("warning", NO_RIG)
             return

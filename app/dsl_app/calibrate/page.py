@@ -148,7 +148,7 @@ class CalibratePage(PageWidget):
                 state.refused,
                 state.library,
                 state.in_use,
-                self._rig.devices,
+                self._rig.usable,
             ),
             state.everything.follow(lambda progress: self.picture.setVisible(bool(progress))),
             state.seen.follow(self._show_seen),
@@ -164,7 +164,7 @@ class CalibratePage(PageWidget):
         self._commands.run(name)
 
     def _show_rows(self) -> None:
-        following = main_button(self._state, self._rig.devices.value)
+        following = main_button(self._state, self._rig.usable.value)
         for row in self._state.rows.value:
             if row.name in self.rows:
                 is_running = row.name == self._state.running.value

@@ -46,15 +46,19 @@ class RigChoice:
 class RigState:
     """Values that the rig's controller sets and pages follow.
 
-    ``trouble`` is a sentence on why the rig is not connected (empty: nothing). ``live`` says whether a live
-    view uses the rig, which gives way to jobs. ``used_by`` names the job that uses the rig alone and whose
-    frames another picture would spoil (empty: none).
+    ``usable`` is what there is to measure with: ``devices``, but nothing of a lost rig until it is connected
+    again. ``trouble`` is a sentence on why the rig is not connected (empty: nothing). ``live`` says whether a
+    live view uses the rig, which gives way to jobs. ``used_by`` names the job that uses the rig alone and
+    whose frames another picture would spoil (empty: none).
     """
 
     def __init__(self, choice: RigChoice) -> None:
         self.choice = Value(choice)
         self.link = Value(Link.CLOSED)
         self.devices: Value[DeviceRig | None] = Value(None)
+        self.usable: Value[DeviceRig | None] = Value(None)
+        self.devices.changed.connect(self.usable.set)
+        self.link.changed.connect(lambda link: self.usable.set(None) if link is Link.LOST else None)
         self.trouble = Value("")
         self.live = Value(False)
         self.used_by = Value("")

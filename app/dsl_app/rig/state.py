@@ -90,8 +90,7 @@ def rig_view(
     """
     link, devices = rig.link.value, rig.devices.value
     has_devices = devices is not None
-    # Of a rig that is lost, nothing can be asked before it is connected again.
-    can_look = has_devices and link is not Link.LOST
+    can_look = rig.usable.value is not None
     cycles = cycles_text(live.exposure_ms.value, rig.cycle_ms)
     is_other = is_other and link is Link.OPEN
     is_live, is_calibrated = rig.live.value, devices is not None and devices.calibration is not None

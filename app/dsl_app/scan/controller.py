@@ -74,7 +74,7 @@ class ScanController:
 
     def start(self) -> None:
         """Start the planned scan, or resume the interrupted one."""
-        state, devices = self.state, self._rig.state.devices.value
+        state, devices = self.state, self._rig.state.usable.value
         if state.phase.value.is_busy:
             self._notifier.tell("info", _BUSY)
             return

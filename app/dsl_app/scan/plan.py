@@ -68,7 +68,7 @@ class ScanPlanController:
         #: What was chosen during a scan, which keeps its own calibration.
         self._next: CalibrationChoice | None = None
         self._stops = [
-            rig.devices.follow(lambda _: self.take_rig()),
+            rig.usable.follow(lambda _: self.take_rig()),
             state.phase.changed.connect(self._phase_changed),
             state.then_reconstruct.changed.connect(lambda _: self._what_follows_changed()),
         ]
@@ -175,7 +175,7 @@ class ScanPlanController:
 
     @property
     def _devices(self) -> DeviceRig | None:
-        return self._rig.devices.value
+        return self._rig.usable.value
 
     def take_rig(self) -> None:
         """Adapt plan and calibration to the connected rig."""

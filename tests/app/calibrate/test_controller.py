@@ -8,6 +8,7 @@ from pathlib import Path
 from dsl_app.calibrate.controller import library_name
 from dsl_app.connection.state import RigChoice
 from dsl_app.shared.jobs.base import Job
+from dsl_app.shared.notify import NO_RIG
 
 from dsl_core.io.scan.lock import FolderLock
 from tests.app.calibrate.calibrate_bench import (
@@ -74,6 +75,18 @@ def test_wrong_folders_and_other_rigs_are_named(bench: CalibrateBench, tmp_path:
     bench.rig.disconnect()
     bench.control.run("selftest")
     assert "No rig is connected" in bench.told
+
+
+def test_a_lost_rig_calibrates_nothing_until_it_is_connected_again(bench: CalibrateBench) -> None:
+    bench.rig.lose("The camera no longer answers.")
+    assert bench.state.trouble.value == NO_RIG
+    bench.control.run("selftest")
+    assert bench.told == NO_RIG
+    assert not bench.state.opening.value
+    bench.control.library.check("twin")
+    assert bench.told == NO_RIG
+    bench.control.connect_rig()
+    assert bench.state.trouble.value == ""
 
 
 def test_the_command_line_names_campaign_and_rig(bench: CalibrateBench) -> None:

@@ -206,6 +206,16 @@ def test_a_lost_rig_that_does_not_answer_is_closed_again_and_stays_lost(
     assert not notifier.told
 
 
+def test_there_is_nothing_to_measure_with_from_a_loss_until_the_next_connection() -> None:
+    rig, _ = controller()
+    rig.connect(TWIN)
+    assert rig.state.usable.value is rig.state.devices.value is not None
+    rig.lose("The camera sent no frame.")
+    assert rig.state.usable.value is None
+    rig.connect(TWIN)
+    assert rig.state.usable.value is rig.state.devices.value is not None
+
+
 def test_devices_that_do_not_close_keep_nobody_from_another_rig(monkeypatch: pytest.MonkeyPatch) -> None:
     rig, _ = controller()
     rig.connect(TWIN)

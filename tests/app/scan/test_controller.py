@@ -14,6 +14,7 @@ from dsl_app.scan.job import ScanJob
 from dsl_app.scan.plan import connect_first, was_taken_with
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
 from dsl_app.scan.state import CalibrationChoice, InterruptedScan, Phase, Reconnection
+from dsl_app.shared.notify import NO_RIG
 
 from dsl_core import pipeline
 from dsl_core.capture.metering import Metered
@@ -72,6 +73,19 @@ def test_without_a_rig_nothing_starts_and_the_reason_is_told(tmp_path: Path) -> 
     bench.scans.start()
     assert phase(bench) is Phase.PLANNING
     assert "Connect one on the Rig page" in bench.notifier.told[-1][1]
+
+
+def test_on_a_lost_rig_nothing_starts_until_it_is_connected_again(bench: ScanBench) -> None:
+    bench.rig.lose("The camera no longer answers.")
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert facts.obstacles == (NO_RIG,)
+    bench.scans.start()
+    assert (phase(bench), bench.notifier.told[-1]) == (Phase.PLANNING, ("warning", NO_RIG))
+    bench.scans.connect_rig()
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert facts.obstacles == ()
 
 
 def test_a_plan_is_fitted_to_the_rig_and_its_cost_is_known(bench: ScanBench) -> None:

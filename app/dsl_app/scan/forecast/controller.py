@@ -61,7 +61,7 @@ class ForecastController:
         #: Whether only custom plans are left to predict: all others are done, or the person stopped the job.
         self._is_complete = False
         self._stops = [
-            rig.devices.follow(lambda _: self._renew()),
+            rig.usable.follow(lambda _: self._renew()),
             scan.calibration.changed.connect(lambda _: self._renew()),
             scan.plan.changed.connect(lambda _: self._plan_changed()),
             scan.phase.changed.connect(self._phase_changed),
@@ -94,7 +94,7 @@ class ForecastController:
 
     def _renew(self) -> None:
         """Discard predictions for another rig or calibration."""
-        now, is_there = self._rigging(), self._rig.devices.value is not None
+        now, is_there = self._rigging(), self._rig.usable.value is not None
         self.state.trouble.set(NO_CALIBRATION if now is None and is_there else "")
         self.state.is_ready.set(self._may_start and now is not None and is_there)
         if now == self._of:
