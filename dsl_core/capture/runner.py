@@ -49,9 +49,9 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Status:
-    """A moment of a scan; ``done`` counts saved frames, those of earlier runs included.
+    """A moment of a scan; ``done`` counts saved frames, the ``earlier`` ones of runs before included.
 
-    ``elapsed_s`` is the time spent running, pauses left out; ``remaining_s`` is estimated from it.
+    ``elapsed_s`` is the time this run has spent, pauses left out; ``remaining_s`` is estimated from it.
     ``corrected`` counts shots that were taken again because a picture did not show their pattern,
     ``warning`` says what moved meanwhile, and ``overexposed`` how much is.
     """
@@ -66,6 +66,7 @@ class Status:
     corrected: int = 0
     warning: str = ""
     overexposed: str = ""
+    earlier: int = 0
 
 
 Listener = Callable[[Status], None]
@@ -168,6 +169,8 @@ class Runner:
             require_possible(self._rig, self._plan)
             self._require_place(list(self._sink.missing()))
             missing = list(self._sink.missing())
+            earlier = self._plan.shot_count - len(missing)
+            self._status = replace(self._status, done=earlier, earlier=earlier)
             is_proven = self._is_proven and not missing
             if self._stored is not None:
                 self._shots.learn(self._stored, {shot.index for shot in missing})

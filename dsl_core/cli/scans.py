@@ -246,9 +246,10 @@ def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) 
 def _done(output: Output, target: Path, status: Status) -> None:
     from dsl_core.workflows.scans import known_doubts
 
-    output.say(
-        f"All {status.total} frames are saved in {target} ({status.elapsed_s:.1f} s). {next_step(target)}"
-    )
+    captured = status.done - status.earlier
+    which = f"{captured} of them in " if status.earlier else ""
+    time = f"{which}{status.elapsed_s:.1f} s"
+    output.say(f"All {status.total} frames are saved in {target} ({time}). {next_step(target)}")
     if status.overexposed:  # said on standard error when it was seen
         output.put(overexposed=status.overexposed)
     if status.warning:
@@ -259,7 +260,8 @@ def _done(output: Output, target: Path, status: Status) -> None:
         output.say(each)
     if doubts:
         output.put(doubts=doubts)
-    output.put(scan=target, frames=status.total, seconds=round(status.elapsed_s, 2), state="finished")
+    output.put(scan=target, frames=status.total, state="finished")
+    output.put(captured=captured, seconds=round(status.elapsed_s, 2))
     output.finish()
 
 

@@ -380,7 +380,8 @@ def test_ctrl_c_leaves_a_resumable_session(
     bench.before_snap, bench.before_show = lambda shot, attempt: None, lambda: None
     with ScanWriter.resume(folder, plan, rig) as sink:
         assert next(sink.missing()).index == 7
-        Runner(rig, plan, sink, pattern).run()
+        status = Runner(rig, plan, sink, pattern).run()
+    assert (status.earlier, status.done) == (7, plan.shot_count)
     whole = MemorySink(plan)
     Runner(rig, plan, whole, pattern).run()
     reader = ScanReader(folder)

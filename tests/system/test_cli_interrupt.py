@@ -79,10 +79,12 @@ def test_an_interrupted_scan_says_how_to_resume_and_does(
     assert code == 130, complaint
     assert without_progress(complaint).count("\n") == 1, complaint
     assert f"Resume with: dsl-scan resume {scan}" in complaint
-    assert lines <= FRAMES - len(ScanReader(scan).missing()) < FRAMES
+    lacking = len(ScanReader(scan).missing())
+    assert lines <= FRAMES - lacking < FRAMES
     assert give("reconstruct", scan).code == 2
     resumed = give("resume", scan, "--json").json
     assert (resumed["state"], resumed["scan"]) == ("finished", str(scan))
+    assert (resumed["frames"], resumed["captured"]) == (FRAMES, lacking)
     whole, mended = ScanReader(unbroken), ScanReader(scan)
     assert whole.plan.shot_count == FRAMES
     for shot in whole.plan.shots():

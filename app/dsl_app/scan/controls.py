@@ -8,7 +8,7 @@ from dsl_app.scan.state import Facts, InterruptedScan, LivePicture, Phase, Recon
 from dsl_app.shared.notify import NO_RIG, describe_seconds
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_core.capture.runner import Status
-from dsl_core.words import capitalised
+from dsl_core.words import capitalised, counted
 
 _PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
 #: Why there is nothing to pause or to cancel.
@@ -141,7 +141,11 @@ def progress_text(status: Status) -> ProgressText:
     if status.total <= 0:
         return ProgressText(LabelState(), LabelState())
     spent, left = describe_seconds(status.elapsed_s), describe_seconds(status.remaining_s)
-    time = f"took {spent}" if status.state.is_final else f"{spent} so far, {left} left"
+    took, so_far = f"took {spent}", f"{spent} so far"
+    if status.earlier:
+        # A run does not know how long those before it took.
+        took = so_far = f"{counted(status.done - status.earlier, 'frame')} {took}"
+    time = took if status.state.is_final else f"{so_far}, {left} left"
     return ProgressText(
         LabelState(f"{status.done} of {status.total} frames saved", "muted"), LabelState(time, "muted")
     )

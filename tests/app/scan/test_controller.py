@@ -262,6 +262,7 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     assert bench.scans.command_line() == f"dsl-scan resume {tmp_path / 'first.dsl'}"
     bench.scans.start()
     assert phase(bench) is Phase.DONE
+    assert bench.state.status.value.earlier == 30
     assert bench.state.trouble.value == ""
     assert ScanReader(tmp_path / "first.dsl").missing() == []
 

@@ -137,6 +137,13 @@ def test_progress_is_empty_until_there_is_some() -> None:
     assert progress_text(over).time.text == "took 41 s"
 
 
+def test_the_time_of_a_resumed_scan_is_that_of_the_frames_since() -> None:
+    half = Status(State.RUNNING, done=61, total=76, elapsed_s=2.0, remaining_s=20.0, earlier=60)
+    assert progress_text(half).time.text == "1 frame took 2 s, 20 s left"
+    over = Status(State.FINISHED, done=76, total=76, elapsed_s=14.0, earlier=60)
+    assert progress_text(over).time.text == "16 frames took 14 s"
+
+
 def test_frames_that_nothing_was_made_of_are_reconstructed_next() -> None:
     raw = run_controls(Phase.DONE, None, FREE, "", has_finished=True, has_result=False)
     assert (raw.start.is_primary, raw.again.is_primary, raw.again.text) == (False, True, "Reconstruct…")

@@ -238,7 +238,8 @@ class ForecastController:
 
     def _note_scan(self) -> None:
         status, plan = self._scan.status.value, self._scan.plan.value
-        seconds = None if self._is_faster_than_real else status.elapsed_s
+        # A run does not know how long those before it took.
+        seconds = None if self._is_faster_than_real or status.earlier else status.elapsed_s
         name = self._scan.target.value.stem
         self.state.measured.set(MeasuredScan(name, plan, status.total, seconds))
 

@@ -110,7 +110,8 @@ FIGURES: tuple[ForecastFigure, ...] = (
     ForecastFigure(
         "seconds",
         "Capture",
-        "Exposures and the projector's latency. Not measured on a simulated rig, which does not wait",
+        "Exposures and the projector's latency. Not measured on a simulated rig, which does not wait, nor of"
+        " a scan that was resumed",
         minutes,
     ),
     ForecastFigure(

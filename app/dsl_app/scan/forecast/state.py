@@ -48,8 +48,9 @@ class ForecastPoint:
 class MeasuredScan:
     """Measured figures of a scan.
 
-    Errors are None without a known truth, ``seconds`` on a rig that does not wait, and ``computing_s`` before
-    the scan has a result. ``rmse`` and ``delta_e`` are means over patches, ``pixel_*`` of single pixels.
+    Errors are None without a known truth, ``seconds`` on a rig that does not wait and of a scan that was
+    resumed, and ``computing_s`` before the scan has a result. ``rmse`` and ``delta_e`` are means over
+    patches, ``pixel_*`` of single pixels.
     """
 
     name: str

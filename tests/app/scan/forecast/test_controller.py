@@ -10,6 +10,7 @@ from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity, 
 from dsl_app.scan.state import Phase
 from dsl_app.shared.jobs.base import Job
 
+from dsl_core.capture.runner import State, Status
 from dsl_core.errors import PlanError
 from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
@@ -231,6 +232,19 @@ def test_after_a_scan_what_it_was_stands_beside_what_was_expected(
     assert found.depth_rmse_mm is not None
     assert found.coverage is not None
     assert found.coverage > 0.5
+
+
+@pytest.mark.parametrize(("earlier", "seconds"), [(0, 12.0), (30, None)])
+def test_the_time_of_a_scan_in_parts_is_not_that_of_its_last_one(
+    bench: ScanBench, tmp_path: Path, earlier: int, seconds: float | None
+) -> None:
+    bench.rig.state.choice.set(RigChoice("twin", (*TWIN.options, ("realtime", "on"))))
+    control = forecast(bench, tmp_path, automatic=False)
+    bench.state.status.set(Status(State.FINISHED, done=72, total=72, elapsed_s=12.0, earlier=earlier))
+    bench.state.phase.set(Phase.DONE)
+    found = control.state.measured.value
+    assert found is not None
+    assert found.seconds == seconds
 
 
 def test_a_damaged_store_is_made_anew(bench: ScanBench, tmp_path: Path) -> None:
