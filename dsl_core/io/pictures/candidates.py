@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from glob import escape
 from itertools import pairwise
 from pathlib import Path
 
@@ -166,14 +167,15 @@ def jump_of(candidate: Candidate) -> str:
 
 def _globs(folder: Path, group: Sequence[Path]) -> tuple[str, ...]:
     """The shortest patterns that find just these files in this order, or their names."""
-    names = [path.relative_to(folder).as_posix() for path in group]
+    # Names may have brackets, which would stand for other signs.
+    names = [escape(path.relative_to(folder).as_posix()) for path in group]
     first = names[0]
     parent = first.rpartition("/")[0]
     within = f"{parent}/" if parent else ""
     key = _LAST_NUMBER.sub("*", first.rpartition("/")[2].rpartition(".")[0])
     ending = first.rpartition(".")[2]
     for patterns in (*_EVERYTHING, (f"{within}*",), (f"{within}{key}.{ending}",)):
-        if "[" not in patterns[-1] and picture_files(folder, patterns) == list(group):
+        if picture_files(folder, patterns) == list(group):
             return patterns
     return tuple(names)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from dsl_core.errors import StoreError
+from dsl_core.io.pictures.arrange import picture_files
 from dsl_core.io.pictures.candidates import FEWEST, MOST_ABSENT, Candidate, candidates
 
 
@@ -76,6 +77,16 @@ def test_a_folder_for_each_camera_is_a_capture_of_its_own(tmp_path: Path) -> Non
     assert whole[0].files == ("*", "*/*")
     assert [(each.name, each.left_out) for each in single] == [("a", 4), ("b", 4)]
     assert [each.files for each in single] == [("a/*",), ("b/*",)]
+
+
+def test_brackets_in_names_stand_for_themselves(tmp_path: Path) -> None:
+    kinds = [f"day [{part}]/{side}" for part in "ab" for side in ("left", "right")]
+    folder_of(tmp_path, *(f"{kind}[{number:02d}].png" for kind in kinds for number in range(4)))
+    _, single = candidates(tmp_path)
+    assert "day [[]a]/left[[]*].png" in {each.files[0] for each in single}
+    for each in single:
+        found = picture_files(tmp_path, each.files)
+        assert found == [picture.path for picture in each.pictures if picture is not None]
 
 
 def test_strays_are_left_out_of_a_second_candidate(tmp_path: Path) -> None:

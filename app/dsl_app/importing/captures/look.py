@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -187,9 +188,9 @@ def small_pictures(
 
     thinned = {}
     for name, _ in table[:SMALL_COUNT]:
-        # Pictures of one array are told apart by their place in it.
-        path, _, index = name.removesuffix("]").partition("[")
-        picture = Picture(folder / path, int(index)) if index else Picture(folder / name)
+        # Pictures of one array are told apart by their place in it. No file of pictures ends with a bracket.
+        one = re.fullmatch(r"(.+)\[(\d+)\]", name)
+        picture = Picture(folder / name) if one is None else Picture(folder / one[1], int(one[2]))
         if name != NO_FILE:
             thinned[name] = _thin(load_values(picture, mapping.raw))
     top = max((float(np.percentile(each, 99.5)) for each in thinned.values()), default=0.0) or 1.0

@@ -107,6 +107,16 @@ def test_small_pictures_are_as_bright_as_each_other(folder: Path) -> None:
     assert small["im_00.png"].mean() > 5 * small["im_01.png"].mean()
 
 
+def test_files_with_brackets_in_their_names_are_no_pictures_of_an_array(tmp_path: Path) -> None:
+    dark, bright = np.zeros((24, 32), np.uint16), np.full((24, 32), 255, np.uint16)
+    write(tmp_path, {"shot[00].png": dark, "set[1] shot[a].png": bright})
+    np.save(tmp_path / "all[2].npy", np.stack([dark, bright]))
+    names = ("shot[00].png", "set[1] shot[a].png", "all[2].npy[0]", "all[2].npy[1]")
+    small = small_pictures(tmp_path, MAPPING, tuple((name, "") for name in names))
+    assert list(small) == list(names)
+    assert [each.max() > 0 for each in small.values()] == [False, True, False, True]
+
+
 def test_what_a_calibration_lacks_is_named(folder: Path, tmp_path: Path) -> None:
     request = request_for(folder, tmp_path)
     assert "no depth" in listed(request, tmp_path)[0]
