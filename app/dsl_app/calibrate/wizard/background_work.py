@@ -194,9 +194,10 @@ class BackgroundWork:
         rig = calibrated_rig(campaign, self._devices, library_name or "", self._all)
         return write_products(campaign, rig, library_name, recipes=self._all, library=library)
 
-    def discard(self) -> None:
-        """Discard the fit that waits."""
+    def discard(self) -> Fit | None:
+        """Discard the fit that waits; the accepted one is found again, if there is one."""
         self.session.discard()
+        return self._found()
 
 
 def _require_good(step: Step, look: Look) -> None:

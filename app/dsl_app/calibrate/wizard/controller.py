@@ -327,10 +327,7 @@ class WizardController:
         work = self._the_work
         if self._has_candidate:
             self._jobs.start(
-                Doing.KEEPING,
-                "Discard the fit",
-                lambda progress: work.discard(),
-                lambda _: self.state.fit.set(None),
+                Doing.KEEPING, "Discard the fit", lambda progress: work.discard(), self.state.fit.set
             )
 
     @property

@@ -186,6 +186,22 @@ def test_a_wizard_goes_on_where_it_was_left(bench: CalibrateBench) -> None:
     assert not bench.row("selftest").has_candidate
 
 
+def test_discarding_a_later_fit_shows_the_accepted_one_again(bench: CalibrateBench) -> None:
+    calibrate(bench, "selftest")
+    state, control = bench.wizard("selftest")
+    accepted = fit_of(state)
+    assert accepted is not None
+    control.fit()
+    later = fit_of(state)
+    assert later is not None
+    assert not later.is_accepted
+    control.discard()
+    shown = fit_of(state)
+    assert shown is not None
+    assert shown.is_accepted
+    assert shown.fitted == accepted.fitted
+
+
 def test_redoing_a_step_forgets_the_fit_and_keeps_what_was_accepted(bench: CalibrateBench) -> None:
     calibrate(bench, "selftest")
     state, control = bench.wizard("selftest")
