@@ -62,6 +62,8 @@ class LibraryPanel(QGroupBox):
         super().__init__(LIBRARY)
         self._state, self._commands = state, commands
         self.table = _table()
+        # What the table shows: the state may have others already.
+        self._lines: tuple[LibraryLine, ...] = ()
         # The version that was selected as the next one to use.
         self._offered: LibraryLine | None = None
         self._told = ""
@@ -136,8 +138,7 @@ class LibraryPanel(QGroupBox):
     def line(self) -> LibraryLine | None:
         """The version that is selected."""
         rows = {index.row() for index in self.table.selectedIndexes()}
-        lines = self._state.library.value
-        return lines[min(rows)] if rows and min(rows) < len(lines) else None
+        return self._lines[min(rows)] if rows and min(rows) < len(self._lines) else None
 
     @property
     def key(self) -> str:
@@ -145,10 +146,15 @@ class LibraryPanel(QGroupBox):
         return library_selection(self.line).key
 
     def _list(self, lines: tuple[LibraryLine, ...]) -> None:
-        selected = max(self.table.currentRow(), 0)
+        before, row = self.line, min(max(self.table.currentRow(), 0), len(lines) - 1)
+        if before is not None:
+            # The same version stays selected, wherever it is now.
+            version = before.name, before.stamp
+            row = next((i for i, each in enumerate(lines) if (each.name, each.stamp) == version), row)
+        self._lines = lines
         self.table.show_rows([self._items(line) for line in lines])
         if lines:
-            self.table.selectRow(min(selected, len(lines) - 1))
+            self.table.selectRow(row)
         self._select()
 
     def _mark_next(self) -> None:

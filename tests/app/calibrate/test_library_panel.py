@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QLabel,
 )
 
+from dsl_core.io.calibration_library import LibraryLine
 from dsl_core.model.figure import Figure
 from tests.app.calibrate.page_stage import Stage, cell, click
 
@@ -50,6 +51,26 @@ def test_an_export_has_the_ending_by_which_it_is_imported(
         monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, chosen=chosen: chosen)
         panel._export()
         assert asked.pop() == ("room 12", tmp_path / name, form, {"overwrite": form == "published"})
+
+
+def test_the_version_that_is_selected_stays_so_when_others_come_and_go(
+    stage: Stage, panel: LibraryPanel
+) -> None:
+    library = stage.bench.state.library
+    old, now = LibraryLine("room 12", "20260301", False), LibraryLine("room 12", "20260302", True)
+    library.set((now, old))
+    panel.table.selectRow(1)
+    assert panel.key == "room 12@20260301"
+    library.set((LibraryLine("bench", "20260303", True), now, old))
+    assert panel.key == "room 12@20260301"
+    library.set((replace(old, is_current=True), replace(now, is_current=False)))
+    assert panel.key == "room 12"
+    assert panel.line is not None
+    assert panel.line.stamp == old.stamp
+    library.set((now,))
+    assert panel.key == "room 12", "another one is selected when it is gone"
+    library.set(())
+    assert panel.key == ""
 
 
 def test_a_missed_drift_check_offers_to_check_again_and_to_go_on(
