@@ -160,7 +160,7 @@ class GraphPlot(QWidget):
             " order, the first orders are on either side.",
             "Raw counts (DN)", "First column of the line (px)",
         )  # fmt: skip
-        self._title = label(NO_PIXEL, "heading")
+        self._title = label(NO_PIXEL, "heading", wraps=True)
         self._curves: list[Any] = []
         self.plot.setXRange(0, PUBLISHED_COLUMNS, padding=0.02)
         self.plot.setYRange(0, 1000, padding=0.02)

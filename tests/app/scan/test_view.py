@@ -38,3 +38,17 @@ def test_the_ends_of_a_depth_are_told_apart(qtbot: QtBot, low_mm: float, high_mm
     qtbot.addWidget(picture)
     picture.show_depth(np.linspace(low_mm, high_mm, 2000, dtype=np.float32).reshape(40, 50))
     assert says in picture._text.text()
+
+
+def test_the_title_of_the_graph_is_all_there_where_it_is_narrow(qtbot: QtBot) -> None:
+    plot = GraphPlot()
+    qtbot.addWidget(plot)
+    title = plot._title
+    width_px = title.fontMetrics().horizontalAdvance(title.text()) * 3 // 4
+    plot.resize(width_px, 300)
+    plot.show()
+    graph = BlockGraph((3214, 1420), 2, np.arange(4.0), np.full((1, 4, 3), 7.0, np.float32))
+    for shown in (None, graph):
+        plot.show_graph(shown)
+        qtbot.waitUntil(lambda: title.height() >= title.heightForWidth(title.width()))
+        assert plot.width() == width_px
