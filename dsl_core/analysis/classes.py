@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.library import SpectralLibrary
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.result import SPECTRUM_INVALID, Flag
+from dsl_core.model.spectral import at_bands
 
 Floats = NDArray[np.float64]
 Cube = NDArray[np.float32] | NDArray[np.float64]

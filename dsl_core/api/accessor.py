@@ -15,10 +15,11 @@ from dsl_core.errors import DecodeError
 from dsl_core.evaluation.marks import explain_pixel, largest_difference, region_spectrum
 from dsl_core.io.export import export_by_ending
 from dsl_core.io.result.result_file import save_result
-from dsl_core.model.attributes import SCALE_ATTRIBUTE
+from dsl_core.model.attributes import SCALE_ATTRIBUTE, stated_band_width_nm
 from dsl_core.model.fit import Fit
 from dsl_core.model.result import DEPTH_INVALID, VARIABLES, Flag
 from dsl_core.model.result_order import BANDS, with_axes, with_bits
+from dsl_core.model.spectral import SpectralCurve, at_bands
 from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
@@ -128,6 +129,17 @@ class ResultAccessor:
             "reflectance_std": a["reflectance_std"].copy(data=np.hypot(a_std, b_std)),
         }
         return xr.Dataset(values, attrs=attrs)
+
+    def at_bands(self, spectrum: xr.DataArray) -> xr.DataArray:
+        """A spectrum of `read_spectra` at the bands of this result, as a mean over each, as its own are.
+
+        Raises `CalibrationError` where the spectrum does not cover them.
+        """
+        self._require_spectra()
+        nm = np.sort(self._result[BANDS].values.astype(np.float64))
+        curve = SpectralCurve.of(spectrum[BANDS].values, spectrum.values)
+        found = at_bands(curve, nm, stated_band_width_nm(self._result.attrs, nm))
+        return xr.DataArray(found.values, {BANDS: nm}, (BANDS,), name=spectrum.name)
 
     def reasons(self, x: int, y: int) -> list[str]:
         """Why a pixel is limited, a sentence each; empty where nothing is.

@@ -99,10 +99,10 @@ def read_spectra(path: FilePath) -> dict[str, xr.DataArray]:
     """Reflectances of a spectroradiometer's or this program's file, by name, over ``wavelength_nm``.
 
     ASD, SVC, Spectral Evolution, Ocean, Avantes, CS-2000, JCAMP-DX, CGATS, ENVI libraries and tables of text
-    are known; a spectrum without a name has that of the file. To compare one with a result, take it at its
-    bands::
+    are known; a spectrum without a name has that of the file. To compare one with a result, average it over
+    its bands::
 
-        tile = dsl.read_spectra("tile.csv")["tile"].interp(wavelength_nm=result["wavelength_nm"])
+        tile = result.dsl.at_bands(dsl.read_spectra("tile.csv")["tile"])
         off = result.dsl.region((48, 28, 6, 5))["reflectance"] - tile
 
     Raises `CalibrationError` for a file without reflectances, and one whose units cannot be told.

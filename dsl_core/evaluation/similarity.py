@@ -17,20 +17,6 @@ Map = NDArray[np.float32]
 BLOCK_ROWS = 64
 
 
-def spectrum_at(bands_nm: NDArray[np.float64], nm: Floats, values: Floats) -> NDArray[np.float64]:
-    """A spectrum (samples,) at the bands of an image, linear between its samples.
-
-    Beyond its ends nothing is invented: raises `DecodeError` where a band is further out than half a band.
-    """
-    beyond = np.diff(bands_nm).max() / 2 if len(bands_nm) > 1 else 0.0
-    if nm[0] > bands_nm[0] + beyond or nm[-1] < bands_nm[-1] - beyond:
-        raise DecodeError(
-            f"The spectrum covers {nm[0]:g} to {nm[-1]:g} nm; to be searched for, it must cover the bands"
-            f" of the result, {bands_nm[0]:g} to {bands_nm[-1]:g} nm. Choose a reference of this range."
-        )
-    return np.asarray(np.interp(bands_nm, nm, values), np.float64)
-
-
 def angle_map(cube: Floats, spectrum: Floats) -> Map:
     """Spectral angle (rad) between each pixel of (bands, rows, columns) and a spectrum (bands,).
 

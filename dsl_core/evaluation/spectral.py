@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
-from dsl_core.model.spectral import SpectralCurve
+from dsl_core.model.spectral import SpectralCurve, at_bands, band_widths_nm
 from dsl_core.optics.colour import delta_e_2000, hold_colour, reflectance_to_lab
 
 Floats = NDArray[np.float64]
@@ -147,12 +147,14 @@ def compare(
     reference: SpectralCurve,
     std: NDArray[np.floating] | None = None,
     correlation: Floats | None = None,
+    width_nm: float | None = None,
 ) -> SpectrumComparison:
-    """Compare a spectrum (bands,) with a reference, interpolated linearly, where both have values.
+    """Compare a spectrum (bands,) with a reference, averaged by `at_bands`, where both have values.
 
     ``std`` (bands,) are the deviations of the spectrum and ``correlation`` (bands, bands) says how its bands
-    err together, not at all if it is not given; a reference has its own deviations, shared alike. Raises
-    `DecodeError` when they share too few bands.
+    err together, not at all if it is not given; a reference has its own deviations, shared alike. The bands
+    are ``width_nm`` wide; as far as they are apart, unless it is known. Raises `DecodeError` when they share
+    too few bands.
     """
     nm = np.asarray(reference.wavelengths_nm)
     shared = (wavelengths_nm >= nm[0]) & (wavelengths_nm <= nm[-1]) & np.isfinite(spectrum)
@@ -163,13 +165,14 @@ def compare(
             f" {MIN_BANDS} are needed."
         )
     bands = np.asarray(wavelengths_nm[shared], np.float64)
-    wanted = np.interp(bands, nm, np.asarray(reference.values))[:, None]
+    known = at_bands(reference, bands, band_widths_nm(wavelengths_nm, width_nm)[shared])
+    wanted = known.values[:, None]
     measured = np.asarray(spectrum[shared], np.float64)[:, None]
     found = spectral_errors(measured, wanted, bands)
     together = np.eye(count) if correlation is None else _root(correlation[np.ix_(shared, shared)])
     stds = (
         None if std is None else np.asarray(std[shared], np.float64),
-        None if reference.std is None else np.interp(bands, nm, np.asarray(reference.std)),
+        None if reference.std is None else known.std,
     )
     return SpectrumComparison(
         **known_of_first(found, bands),

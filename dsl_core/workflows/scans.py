@@ -31,7 +31,13 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest, refuse_other_scan
 from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_notes
 from dsl_core.io.scan.proof_file import read_proof
-from dsl_core.model.attributes import DOUBTS, PLAN_ATTRIBUTE, SCALE_ATTRIBUTE, plan_of
+from dsl_core.model.attributes import (
+    DOUBTS,
+    PLAN_ATTRIBUTE,
+    SCALE_ATTRIBUTE,
+    plan_of,
+    stated_band_width_nm,
+)
 from dsl_core.model.conditions import differences
 from dsl_core.model.fit import ATTRIBUTE as FIT_ATTRIBUTE
 from dsl_core.model.fit import Fit
@@ -341,24 +347,18 @@ def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:
 
 def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
     """The ground truth of the twin's scene; None for a real rig."""
-    return _twin_truth(rig, grid.centres_nm)
+    return _twin_truth(rig, grid.centres_nm, grid.step_nm)
 
 
-def _twin_truth(rig: DeviceRig, wavelengths_nm: NDArray[np.float64]) -> Truth | None:
+def _twin_truth(rig: DeviceRig, bands_nm: NDArray[np.float64], width_nm: float | None) -> Truth | None:
     from dsl_core.simulation.sim_devices import SimCamera
 
     if not isinstance(rig.camera, SimCamera):
         return None
     truth = rig.camera.world.truth_of_colours
     materials = truth.materials
-    return Truth(
-        truth.depth_mm,
-        truth.lit,
-        truth.material,
-        materials.names,
-        materials.at(wavelengths_nm),
-        materials.targets,
-    )
+    spectra = materials.over_bands(bands_nm, width_nm)
+    return Truth(truth.depth_mm, truth.lit, truth.material, materials.names, spectra, materials.targets)
 
 
 def truth_of(
@@ -378,7 +378,8 @@ def truth_of(
     if rig_name is None and not is_built_in(origin[0]):
         raise DecodeError(_no_truth(origin[0]))
     with open_rig(*origin) as rig:
-        truth = _twin_truth(rig, _bands_of(result))
+        bands_nm = _bands_of(result)
+        truth = _twin_truth(rig, bands_nm, stated_band_width_nm(result.attrs, bands_nm))
     if truth is None:
         raise DecodeError(_no_truth(origin[0]))
     return _truth_of_part(truth, result)

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.classes import Member, SpectralClass
 from dsl_core.analysis.classification import classify_result
 from dsl_core.analysis.classify import Limits, Measure
 from dsl_core.evaluation.summary import interior
 from dsl_core.io.result.result_file import load_result
-from dsl_core.model.spectral import SpectralCurve
+from dsl_core.model.spectral import SpectralCurve, at_bands
 from dsl_core.resources import resource_path
 from dsl_core.simulation.scenes.materials import chart_spectra
 from dsl_core.simulation.scenes.truth import FINE_NM

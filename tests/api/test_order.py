@@ -161,3 +161,16 @@ def test_results_saved_with_floats_as_flags_are_read_with_whole_ones(
     stored = load_arrays(path)
     assert [str(stored[name].dtype) for name in ("flags", "reach")] == ["uint16", "uint8"]
     np.testing.assert_array_equal(stored["flags"] == 0, usual.dsl.good)
+
+
+def test_a_spectrum_of_another_instrument_is_averaged_over_bands_in_any_order(
+    changed: xr.Dataset, tmp_path: Path
+) -> None:
+    result = dsl.load_result(dsl.save_result(changed, tmp_path / "a.zarr"))
+    fine = np.arange(300.0, 801.0)
+    line = xr.DataArray((fine == 550) * 1.0, {"wavelength_nm": fine}, ("wavelength_nm",))
+    means = CHANGES["bands fall"](result).dsl.at_bands(line)
+    # Of these bands nobody says how wide they are: as far as they are apart.
+    width_nm = (655.0 - 432.5) / 2
+    assert float(means.sel(wavelength_nm=550)) == pytest.approx(1 / width_nm, rel=0.1)
+    assert (result["reflectance"] - means).sizes == result["reflectance"].sizes

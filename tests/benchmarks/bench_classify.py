@@ -21,12 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import dsl_core as dsl
-from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.classes import Member, SpectralClass
 from dsl_core.analysis.classification import classify_result
 from dsl_core.analysis.classify import Measure
 from dsl_core.evaluation.summary import interior
-from dsl_core.model.spectral import SpectralCurve
+from dsl_core.model.spectral import SpectralCurve, at_bands
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.benchmarks.common import print_table, write_json
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.similarity import angle_map, angle_noise, likeness, spectrum_at
+from dsl_core.evaluation.similarity import angle_map, angle_noise, likeness
 
 NM = np.arange(430.0, 661.0, 5.0)
 
@@ -40,17 +40,6 @@ def test_bands_that_hold_no_colour_have_no_metamers_and_are_still_searched() -> 
     assert np.isnan(found.delta_e).all()
     assert not found.metamers(2.0, 0.05).any()
     assert found.same_spectrum(0.05).tolist() == [[True, False]]
-
-
-def test_a_spectrum_is_not_continued_beyond_its_ends() -> None:
-    bands = np.arange(430.0, 661.0, 10.0)
-    nm = np.arange(400.0, 701.0, 3.0)
-    np.testing.assert_allclose(spectrum_at(bands, nm, nm / 1000), bands / 1000)
-    # Half a band further is still the band's own light.
-    assert spectrum_at(bands, np.array([435.0, 655.0]), np.array([0.1, 0.3]))[0] == 0.1
-    for low, high in ((400.0, 550.0), (436.0, 700.0)):
-        with pytest.raises(DecodeError, match=rf"{low:g} to {high:g} nm.*430 to 660 nm"):
-            spectrum_at(bands, np.array([low, high]), np.array([0.1, 0.3]))
 
 
 def test_deviations_alone_make_an_angle() -> None:

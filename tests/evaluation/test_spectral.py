@@ -7,7 +7,7 @@ import pytest
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.spectral import compare, peak_width, spectral_errors
-from dsl_core.model.spectral import SpectralCurve
+from dsl_core.model.spectral import SpectralCurve, at_bands
 
 GRID = np.arange(430.0, 661.0, 5.0)
 TRUTH = (0.5 + 0.3 * np.sin(GRID / 40))[:, None]
@@ -105,6 +105,22 @@ def test_a_reference_of_another_scale_differs_only_by_the_scale() -> None:
     assert found.rmse > 0.2
     assert found.rmse_scaled == pytest.approx(0, abs=1e-9)
     assert found.delta_e_scaled < 1e-3 < found.delta_e
+
+
+@pytest.mark.parametrize("step_nm", [5.0, 10.0, 20.0])
+def test_a_reference_is_averaged_over_bands_as_the_spectrum_is(step_nm: float) -> None:
+    fine = np.arange(400.0, 701.0)
+    lines = SpectralCurve.of(fine, 0.9 - 0.5 * np.exp(-(((fine - 585) / 7) ** 2)), std=np.full(301, 0.01))
+    bands = np.arange(430.0, 651.0, step_nm)
+    exact = at_bands(lines, bands, step_nm)
+    found = compare(exact.values, bands, lines)
+    assert (found.rmse, found.delta_e) == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert found.std is not None
+    assert found.std.scale < 0.01 / np.sqrt(step_nm * 0.9)
+    # Bands that were picked are as wide as before.
+    some = compare(exact.values[::2], bands[::2], lines, width_nm=step_nm)
+    assert some.rmse == pytest.approx(0.0, abs=1e-9)
+    assert compare(exact.values[::2], bands[::2], lines).rmse > 0.001
 
 
 def test_only_shared_bands_are_compared() -> None:

@@ -12,7 +12,8 @@ import dsl_core as dsl
 from dsl_core import pipeline
 from dsl_core.errors import DecodeError
 from dsl_core.io.result.result_file import load_result, save_result
-from dsl_core.workflows.scans import truth_of
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.workflows.scans import truth_of, twin_truth
 from dsl_core.workflows.series import read_sweep
 from tests.app.support.compare_bench import make_result
 
@@ -42,6 +43,22 @@ def test_bands_are_those_of_the_result(whole: xr.Dataset, bands: list[int]) -> N
     assert every.spectra is not None
     np.testing.assert_allclose(here.spectra, every.spectra[:, bands], atol=1e-12)
     assert dsl.evaluate(some).mean("rmse") < 2 * dsl.evaluate(whole).mean("rmse")
+
+
+@pytest.mark.parametrize("step_nm", [5.0, 10.0])
+def test_the_truth_is_averaged_over_bands_as_results_are(step_nm: float) -> None:
+    with dsl.open_rig("twin", size="48x32", scene="filters") as rig:
+        found = twin_truth(rig, WavelengthGrid(step_nm=step_nm))
+        fine = twin_truth(rig, WavelengthGrid(step_nm=1.0))
+    assert found is not None
+    assert found.spectra is not None
+    assert fine is not None
+    assert fine.spectra is not None
+    lines = list(found.targets or ())
+    # Lines of 10 nm keep their area in bands of any width, and lose their height.
+    np.testing.assert_allclose(found.spectra[lines].sum(1) * step_nm, fine.spectra[lines].sum(1), rtol=0.03)
+    peak = {5.0: 0.79, 10.0: 0.65}[step_nm]
+    assert found.spectra[lines].max() < peak < fine.spectra[lines].max()
 
 
 def test_a_part_that_does_not_say_where_it_is_is_refused(whole: xr.Dataset) -> None:

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
+from dsl_core.model.attributes import stated_band_width_nm
 from dsl_core.model.result import VARIABLES
 from dsl_core.model.result_order import BANDS, as_bits, places_px, require_wavelengths, rising_order
+from dsl_core.model.spectral import BandValues, SpectralCurve, at_bands
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
@@ -63,6 +65,15 @@ class ResultArrays:
     def at(self, name: str, pixel: tuple[int, int]) -> NDArray[Any]:
         """Everything that a variable holds for a pixel ``(x, y)``: one value, or one per band or axis."""
         return self.arrays[name][..., pixel[1], pixel[0]]
+
+    @property
+    def band_width_nm(self) -> float | None:
+        """How wide the bands are; None where the result does not say."""
+        return stated_band_width_nm(self.attributes, self.wavelengths_nm)
+
+    def at_bands(self, curve: SpectralCurve) -> BandValues:
+        """A spectrum at the bands; raises `CalibrationError` where it does not cover them."""
+        return at_bands(curve, self.wavelengths_nm, self.band_width_nm)
 
     @property
     def places_px(self) -> tuple[NDArray[np.int64] | None, NDArray[np.int64] | None]:

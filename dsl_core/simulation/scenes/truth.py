@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
 from dsl_core.model.geometry import Lens
+from dsl_core.model.spectral import band_weights, band_widths_nm
 from dsl_core.optics.pinhole import pixel_rays, rays_at
 from dsl_core.simulation.scenes.surfaces import Shape, materials_along, trace
 
@@ -84,6 +85,15 @@ class Materials:
         """Reflectance at other wavelengths (nm), linear between samples, shape (M, bands)."""
         rows = [np.interp(wavelengths_nm, self.wavelengths_nm, row) for row in self.reflectance]
         return np.stack(rows)
+
+    def over_bands(self, bands_nm: NDArray[np.float64], width_nm: float | None = None) -> NDArray[np.float64]:
+        """Mean reflectance over the triangle of each band, shape (M, bands); as `at` beyond the palette.
+
+        ``width_nm`` is how wide bands are at half height; as far as they are apart, unless it is known.
+        """
+        weights = band_weights(self.wavelengths_nm, bands_nm, band_widths_nm(bands_nm, width_nm))
+        means = self.reflectance @ weights.T
+        return np.where(np.isfinite(means), means, self.at(bands_nm))
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,8 @@ from dsl_app.shared.widgets.forms import ChoiceBox, label, push_button
 from dsl_app.shared.widgets.icons import swatch
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
-from dsl_core.analysis.at_bands import at_bands
 from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of, lights_for
 from dsl_core.errors import CalibrationError, DecodeError
-from dsl_core.model.attributes import stated_band_width_nm
 from dsl_core.model.figure import with_std
 from dsl_core.optics.colour import hold_colour
 
@@ -93,13 +91,12 @@ class ColoursPanel(QWidget):
         if result is None or not result.has_spectra:
             return []
         bands, spectra = result.wavelengths_nm, {}
-        width_nm = stated_band_width_nm(result.attributes, bands)
         for name, mark in marks.items():
             spectrum = mark.spectrum
             mean, std = spectrum.mean, mark.band_std
             if mark.curve is not None:
                 try:
-                    at = at_bands(mark.curve, bands, width_nm)
+                    at = result.at_bands(mark.curve)
                 except CalibrationError:
                     continue
                 mean, std = at.values, None if mark.curve.std is None else at.std

@@ -63,12 +63,10 @@ class AnswersController:
         ) -> tuple[tuple[SpectralClass, ...], tuple[str, ...]]:
             from dsl_core.analysis.classes import classes_of_library
             from dsl_core.analysis.library import read_library
-            from dsl_core.model.attributes import stated_band_width_nm
 
             library = read_library([path], way.grouping, progress=progress)
             nm = result.wavelengths_nm
-            width_nm = stated_band_width_nm(result.attributes, nm)
-            found, left_out = classes_of_library(library, nm, way.library_error, width_nm)
+            found, left_out = classes_of_library(library, nm, way.library_error, result.band_width_nm)
             return found, (*library.notes, *left_out)
 
         self._start(path.name, way, classes)
@@ -183,13 +181,10 @@ def classes_of_marks(result: ResultArrays, marks: list[Mark]) -> tuple[SpectralC
     """
     import numpy as np
 
-    from dsl_core.analysis.at_bands import at_bands
     from dsl_core.analysis.classes import Member, class_of_pixels
     from dsl_core.errors import CalibrationError, DecodeError
     from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs
-    from dsl_core.model.attributes import stated_band_width_nm
 
-    width_nm = stated_band_width_nm(result.attributes, result.wavelengths_nm)
     std = result.known("reflectance_std")
     if std is None:
         raise DecodeError(
@@ -200,7 +195,7 @@ def classes_of_marks(result: ResultArrays, marks: list[Mark]) -> tuple[SpectralC
     for mark in marks:
         if mark.curve is not None:
             try:
-                found = at_bands(mark.curve, result.wavelengths_nm, width_nm)
+                found = result.at_bands(mark.curve)
             except CalibrationError as error:
                 raise CalibrationError(f"{mark.name} cannot be looked for. {error}") from error
             classes.append(SpectralClass(mark.name, (Member.of(found.values, found.std),)))

@@ -30,7 +30,7 @@ def comparison_html(state: ResultsState, theme: Theme) -> str:
     return (
         region_table(chosen, state.band.value, theme)
         + difference_table(chosen, shown, theme)
-        + comparison_table(chosen, shown, theme)
+        + comparison_table(chosen, shown, result.band_width_nm, theme)
         + distance_table(chosen, shown, result, theme)
     )
 
@@ -82,16 +82,16 @@ def difference_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
     return _table(head, rows, theme)
 
 
-def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
+def comparison_table(chosen: Mark, others: list[Mark], width_nm: float | None, theme: Theme) -> str:
     """A spectrum compared with every reference, or a reference with every spectrum.
 
-    Each as measured, and with a free scale factor for the spectrum.
+    Each as measured, and with a free scale factor for the spectrum. Bands are ``width_nm`` wide.
     """
     rows = []
     for mark in others:
         measured, reference = (mark, chosen) if chosen.curve is not None else (chosen, mark)
         if measured.curve is None and reference.curve is not None:
-            rows += _compared(mark.name, measured, reference.curve, theme)
+            rows += _compared(mark.name, measured, reference.curve, width_nm, theme)
     if rows:
         rows.append(f"<tr><td colspan='4'>{_ABOUT}</td></tr>")
     return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00"], rows, theme)
@@ -103,12 +103,14 @@ _THIN = chr(0x200A)
 _ABOUT = "±: one deviation, from those stated for the bands of one pixel."
 
 
-def _compared(name: str, measured: Mark, curve: SpectralCurve, theme: Theme) -> list[str]:
+def _compared(
+    name: str, measured: Mark, curve: SpectralCurve, width_nm: float | None, theme: Theme
+) -> list[str]:
     """The rows of one comparison, which begin with the name of what is compared with."""
     name, spectrum = escape(name), measured.spectrum
     try:
         together = usual_correlation(spectrum.nm)
-        found = compare(spectrum.mean, spectrum.nm, curve, measured.band_std, together)
+        found = compare(spectrum.mean, spectrum.nm, curve, measured.band_std, together, width_nm)
     except DslError as error:
         return [f"<tr><td>{name}</td><td colspan='3'>{escape(str(error))}</td></tr>"]
     low, high = found.range_nm

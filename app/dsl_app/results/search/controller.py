@@ -7,7 +7,9 @@ from dataclasses import replace
 from dsl_app.results.state import ResultsState, Search, SearchMode
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
-from dsl_app.shared.spectrum import Spectrum
+from dsl_app.shared.spectrum import Floats, Spectrum
+from dsl_core.errors import CalibrationError
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import Progress
 
 
@@ -30,13 +32,23 @@ class SearchController:
 
         self._latest = number = self._latest + 1
 
-        def work(progress: Progress) -> Search:
-            from dsl_core.evaluation.similarity import angle_noise, likeness, spectrum_at
+        def wanted() -> Floats:
+            if isinstance(target, Spectrum):
+                return target.mean
+            try:
+                return result.at_bands(target).values
+            except CalibrationError as error:
+                raise CalibrationError(
+                    f"{name} cannot be searched for. {error} Choose a reference of this range."
+                ) from error
 
-            nm, std = result.wavelengths_nm, result.known("reflectance_std")
+        def work(progress: Progress) -> Search:
+            from dsl_core.evaluation.similarity import angle_noise, likeness
+
+            std = result.known("reflectance_std")
             return Search(
                 name,
-                likeness(result["reflectance"], spectrum_at(nm, target.nm, target.mean), nm, progress),
+                likeness(result["reflectance"], wanted(), result.wavelengths_nm, progress),
                 mode,
                 noise_rad=None if std is None else angle_noise(result["reflectance"], std),
             )
@@ -64,10 +76,10 @@ class SearchController:
         self._latest += 1
         self.state.search.set(None)
 
-    def _target(self) -> tuple[str, Spectrum | None]:
+    def _target(self) -> tuple[str, Spectrum | SpectralCurve | None]:
         mark, cursor = self.state.selected_mark, self.state.cursor.value
         if mark is not None:
-            return mark.name, None if mark.trouble else mark.spectrum
+            return mark.name, None if mark.trouble else mark.curve or mark.spectrum
         if cursor is not None:
             result = self.state.result.value
             x_px, y_px = cursor if result is None else result.in_picture(cursor)

@@ -46,6 +46,19 @@ def test_a_reference_of_part_of_the_range_is_not_looked_for(bench: Bench, tmp_pa
     assert bench.state.search.value is None
 
 
+def test_a_reference_is_averaged_over_the_bands_of_the_result(bench: Bench, tmp_path: Path) -> None:
+    fine = np.arange(400.0, 701.0)
+    # Lines of 1 nm right at the bands, which their means hardly see.
+    values = np.interp(fine, NM, BLUE) - 0.09 * (fine % 20 == 10)
+    lines = tmp_path / "lines.csv"
+    lines.write_text("\n".join(f"{nm},{value}" for nm, value in zip(fine, values, strict=True)))
+    bench.control.open(lines)
+    bench.control.search.start(SearchMode.SPECTRUM)
+    search = bench.state.search.value
+    assert search is not None
+    assert search.likeness.angle_rad[3, 3] < 0.04
+
+
 def test_the_share_found_is_of_pixels_with_a_spectrum(bench: Bench) -> None:
     bench.control.point_at((30, 5))
     bench.control.search.start(SearchMode.SPECTRUM)

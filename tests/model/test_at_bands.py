@@ -6,11 +6,10 @@ import pytest
 from numpy.typing import NDArray
 
 import dsl_core as dsl
-from dsl_core.analysis.at_bands import at_bands, band_weights
 from dsl_core.errors import CalibrationError
 from dsl_core.model.attributes import band_attributes, stated_band_width_nm
 from dsl_core.model.result import build_result
-from dsl_core.model.spectral import SpectralCurve
+from dsl_core.model.spectral import SpectralCurve, at_bands, band_weights
 
 BANDS_NM = np.arange(430.0, 661.0, 5.0)
 FINE_NM = np.arange(400.0, 700.5, 0.5)
@@ -40,6 +39,16 @@ def test_coarse_samples_are_less_sure_between_them_and_stated_deviations_are_kep
     noisy = at_bands(SpectralCurve.of(FINE_NM, np.full(601, 0.5), std=np.full(601, 0.01)), BANDS_NM)
     # The sum of squares of a triangle's weights, ten samples wide at half height, is two thirds of a tenth.
     assert noisy.std == pytest.approx(0.01 * np.sqrt(2 / 3 / 10), rel=0.01)
+
+
+@pytest.mark.parametrize("apart_nm", [5.0, 10.0])
+def test_samples_as_coarse_as_bands_are_not_averaged_once_more(apart_nm: float) -> None:
+    nm = np.arange(430.0, 661.0, apart_nm)
+    curve = SpectralCurve.of(nm, 0.5 + 0.3 * np.sin(nm / 6), std=np.full(nm.size, 0.01))
+    found = at_bands(curve, BANDS_NM, 5.0)
+    at = np.isin(BANDS_NM, nm)
+    assert found.values[at] == pytest.approx(np.asarray(curve.values), abs=1e-4)
+    assert found.std[at] == pytest.approx(0.01, rel=0.01)
 
 
 def test_what_a_spectrum_does_not_cover_is_not_made_up() -> None:
