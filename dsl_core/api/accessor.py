@@ -15,11 +15,17 @@ from dsl_core.errors import DecodeError
 from dsl_core.evaluation.marks import explain_pixel, largest_difference, region_spectrum
 from dsl_core.io.export import export_by_ending
 from dsl_core.io.result.result_file import save_result
-from dsl_core.model.attributes import SCALE_ATTRIBUTE, stated_band_width_nm
+from dsl_core.model.attributes import (
+    BAND_WIDTH,
+    FIRST_BAND,
+    SCALE_ATTRIBUTE,
+    stated_band_width_nm,
+    weights_of_wider,
+)
 from dsl_core.model.fit import Fit
 from dsl_core.model.result import DEPTH_INVALID, VARIABLES, Flag
 from dsl_core.model.result_order import BANDS, with_axes, with_bits
-from dsl_core.model.spectral import SpectralCurve, at_bands
+from dsl_core.model.spectral import SpectralCurve, at_bands, means_of
 from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
@@ -27,7 +33,7 @@ if TYPE_CHECKING:
 
 #: The attribute of a result that says when its scan was captured, and what a region keeps of its scan.
 CAPTURED = "captured"
-OF_SCAN = (CAPTURED, SCALE_ATTRIBUTE)
+OF_SCAN = (CAPTURED, SCALE_ATTRIBUTE, BAND_WIDTH, FIRST_BAND)
 #: What is said of the spectrum of a pixel, band by band.
 _OF_BANDS = ("reflectance", "reflectance_std", "data_share")
 
@@ -94,13 +100,15 @@ class ResultAccessor:
     def difference(self, other: xr.Dataset) -> xr.Dataset:
         """This spectrum less another one, both of `spectrum` or `region`, over the bands that both have.
 
+        Where one has wider bands, the other is averaged over them, with deviations as if bands err together.
         ``reflectance_std`` is the deviation of the difference, errors of both taken as independent; spectra
         of two scans may differ by the scale of each as well, as far as results state it. The
         attributes ``most_nm`` and ``most_sigmas`` say in which band it is the most deviations from zero, and
         by how many; ``differ`` whether these are more than chance makes of so many bands. Raises
         `DecodeError` for what is not one spectrum, and where no band has both.
         """
-        a, b = xr.align(*(_one_spectrum(each) for each in (self._result, other)), join="inner")
+        one, two = (_one_spectrum(each).sortby(BANDS) for each in (self._result, other))
+        a, b = xr.align(_averaged_like(one, two), _averaged_like(two, one), join="inner")
         is_one_scan = a.attrs.get(CAPTURED) == b.attrs.get(CAPTURED)
         a_std, b_std = (
             np.hypot(
@@ -265,3 +273,13 @@ def _one_spectrum(given: xr.Dataset) -> xr.Dataset:
     if not {"reflectance", "reflectance_std"} <= set(given) or given["reflectance"].dims != (BANDS,):
         raise DecodeError("A difference is that of two spectra, as spectrum(x, y) and region(...) return.")
     return given[["reflectance", "reflectance_std"]].reset_coords(drop=True)
+
+
+def _averaged_like(spectrum: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
+    """One spectrum averaged over the bands of another where these are wider; else the very same."""
+    weights = weights_of_wider(spectrum[BANDS].values, spectrum.attrs, other[BANDS].values, other.attrs)
+    if weights is None:
+        return spectrum
+    known = np.isfinite(weights).all(1)
+    means = {name: (BANDS, means_of(each.values, weights[known])) for name, each in spectrum.items()}
+    return xr.Dataset(means, {BANDS: other[BANDS].values[known]}, spectrum.attrs)

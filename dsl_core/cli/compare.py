@@ -40,6 +40,7 @@ def compare(
     with output.progress() as progress:
         a, b = (load_arrays(path, progress) for path in (first, second))
         require_same_places(a.places_px, b.places_px)
+        a, b = a.averaged_like(b), b.averaged_like(a)
         both = a.has_spectra and b.has_spectra
         bands = shared_bands(b.wavelengths_nm, a.wavelengths_nm) if both else []
         cubes = [side["reflectance"] if both else None for side in (b, a)]

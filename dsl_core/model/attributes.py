@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
 from dsl_core.model.plan import CapturePlan
@@ -57,6 +57,30 @@ def stated_band_width_nm(attributes: Mapping[Any, Any], bands_nm: ArrayLike) -> 
         return None
     in_turn = np.abs(np.diff(places)) == 2 * np.abs(places[:1]) + 1
     return None if places[:1].any() and in_turn.size > 1 and in_turn.all() else width
+
+
+def weights_of_wider(
+    bands_nm: ArrayLike,
+    attributes: Mapping[Any, Any],
+    wider_nm: ArrayLike,
+    wider_attributes: Mapping[Any, Any],
+) -> NDArray[np.float64] | None:
+    """Weights (wider, bands) that average bands (bands,), nm, over wider ones (wider,), nm.
+
+    None unless both say how wide they are, they differ, and the bands rise with none left out in between. A
+    row is NaN where the bands do not reach.
+    """
+    nm, wanted_nm = (np.asarray(each, np.float64) for each in (bands_nm, wider_nm))
+    own = stated_band_width_nm(attributes, nm)
+    wider = stated_band_width_nm(wider_attributes, wanted_nm)
+    if own is None or wider is None or wider <= own * (1 + _ON_BAND) or len(nm) < 2:
+        return None
+    if np.ptp(np.append(np.diff(nm), own)) > _ON_BAND * own:
+        return None
+    # Exact where one width is a multiple of the other: a wide triangle is the sum of narrow ones.
+    weights = (1 - np.abs(nm - wanted_nm[:, None]) / wider).clip(min=0)
+    beyond = (wanted_nm < nm[0] - _ON_BAND) | (wanted_nm > nm[-1] + _ON_BAND)
+    return np.where(beyond[:, None], np.nan, weights / weights.sum(1, keepdims=True).clip(min=_ON_BAND))
 
 
 def sentences_of(attributes: Mapping[Any, Any], name: str) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -147,6 +147,15 @@ def band_weights(nm: Floats, bands_nm: Floats, widths_nm: Floats) -> Floats:
             continue
         weights[band] = _spread(fine[covered], mass[covered] / total, nm)
     return weights
+
+
+def means_of(values: NDArray[Any], weights: Floats) -> NDArray[Any]:
+    """Means (means, ...) of bands (bands, ...) by weights (means, bands); one without plays no part."""
+    means = np.zeros((len(weights), *values.shape[1:]), values.dtype)
+    for mean, row in enumerate(weights):
+        for band in np.flatnonzero(row):
+            means[mean] += row[band].astype(values.dtype) * values[band]
+    return means
 
 
 def _spread(fine: Floats, mass: Floats, nm: Floats) -> Floats:

@@ -154,6 +154,7 @@ class ResultReference:
             raise DecodeError(f"{path.name} is what the others are compared with. Name other results.")
         mine, other = self._arrays, load_arrays(path, progress)
         require_same_places(mine.places_px, other.places_px)
+        mine, other = mine.averaged_like(other), other.averaged_like(mine)
         both = mine.has_spectra and other.has_spectra
         bands = shared_bands(mine.wavelengths_nm, other.wavelengths_nm) if both else []
         cubes = [side["reflectance"] if both else None for side in (mine, other)]

@@ -12,8 +12,9 @@ import xarray as xr
 import dsl_core as dsl
 from dsl_core.errors import StoreError
 from dsl_core.io.result.result_arrays import load_arrays
-from dsl_core.model.result import Flag
+from dsl_core.model.result import Flag, build_result
 from dsl_core.model.result_order import canonical, with_axes
+from dsl_core.model.spectral import SpectralCurve, at_bands
 from tests.cases.small_result import small_result
 
 Change = Callable[[xr.Dataset], xr.Dataset]
@@ -174,3 +175,20 @@ def test_a_spectrum_of_another_instrument_is_averaged_over_bands_in_any_order(
     width_nm = (655.0 - 432.5) / 2
     assert float(means.sel(wavelength_nm=550)) == pytest.approx(1 / width_nm, rel=0.1)
     assert (result["reflectance"] - means).sizes == result["reflectance"].sizes
+
+
+def test_a_spectrum_of_finer_bands_is_averaged_before_it_is_subtracted(tmp_path: Path) -> None:
+    fine = np.arange(400.0, 701.0)
+    edge = SpectralCurve.of(fine, np.where(fine > 575, 0.6, 0.05))
+    regions = []
+    for step_nm in (5.0, 10.0):
+        nm = np.arange(430.0, 661.0, step_nm)
+        uneven = np.linspace(0.99, 1.01, 16).reshape(4, 4)
+        cube = (at_bands(edge, nm).values[:, None, None] * uneven).astype(np.float32)
+        result = build_result({"reflectance": cube, "reflectance_std": np.full_like(cube, 0.01)}, nm, {})
+        loaded = dsl.load_result(dsl.save_result(result, tmp_path / f"{step_nm:g}.zarr"))
+        regions.append(loaded.dsl.region((0, 0, 4, 4)))
+    for one, other in (regions, regions[::-1]):
+        less = one.dsl.difference(other)
+        assert less["reflectance"].size == 24
+        assert float(np.abs(less["reflectance"]).max()) < 0.01

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from dsl_core.io.result.result_file import load_result, save_result
+from dsl_core.model.result import build_result
+from dsl_core.model.spectral import SpectralCurve, at_bands
 from dsl_core.workflows.series import position_of, seconds_of
 from tests.cases.small_result import small_result
 from tests.cases.stage_series import write_stage, write_sweep
@@ -29,6 +31,24 @@ def test_two_results_are_compared_first_minus_second(give: Give, tmp_path: Path)
     assert 0 < mean["std"] < 1e-3
     assert figures["Pixels that both have"]["std"] is None
     assert "Depth, mean difference" in give("compare", first, second).out
+
+
+def test_bands_of_different_widths_are_compared_as_the_wider_ones(give: Give, tmp_path: Path) -> None:
+    fine = np.arange(400.0, 701.0)
+    edge = SpectralCurve.of(fine, np.where(fine > 575, 0.6, 0.05))
+    paths = []
+    for step_nm in (5.0, 10.0):
+        nm = np.arange(430.0, 661.0, step_nm)
+        spectrum = at_bands(edge, nm).values.astype(np.float32)
+        arrays = {
+            "depth_mm": np.full((6, 9), 700, np.float32),
+            "reflectance": np.broadcast_to(spectrum[:, None, None], (nm.size, 6, 9)).copy(),
+        }
+        paths.append(save_result(build_result(arrays, nm, {}), tmp_path / f"{step_nm:g}.zarr"))
+    for pair in (paths, paths[::-1]):
+        figures = give("compare", *pair, "--json").json["figures"]
+        assert figures["Common bands"]["value"] == 24
+        assert figures["Reflectance, RMS difference"]["value"] < 0.002
 
 
 @pytest.mark.parametrize("command", [("compare",), ("sweep", "--against")])

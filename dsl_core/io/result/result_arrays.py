@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
-from dsl_core.model.attributes import stated_band_width_nm
+from dsl_core.model.attributes import BAND_WIDTH, FIRST_BAND, stated_band_width_nm, weights_of_wider
 from dsl_core.model.result import VARIABLES
 from dsl_core.model.result_order import BANDS, as_bits, places_px, require_wavelengths, rising_order
-from dsl_core.model.spectral import BandValues, SpectralCurve, at_bands
+from dsl_core.model.spectral import BandValues, SpectralCurve, at_bands, means_of
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 #: What is read of a variable between two looks at whether the person has cancelled.
 AT_ONCE_BYTES = 16e6
+#: What is averaged with the bands; deviations as if bands erred together.
+_AVERAGED = ("reflectance", "reflectance_std", "data_share")
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,23 @@ class ResultArrays:
     def at_bands(self, curve: SpectralCurve) -> BandValues:
         """A spectrum at the bands; raises `CalibrationError` where it does not cover them."""
         return at_bands(curve, self.wavelengths_nm, self.band_width_nm)
+
+    def averaged_like(self, other: ResultArrays) -> ResultArrays:
+        """This result at the bands of another, averaged as far as these are wider; else the very same.
+
+        Both have to say how wide their bands are, and of this one none may be left out in between.
+        """
+        theirs = other.wavelengths_nm, other.attributes
+        weights = weights_of_wider(self.wavelengths_nm, self.attributes, *theirs)
+        if weights is None or not (self.has_spectra and other.has_spectra):
+            return self
+        known = np.isfinite(weights).all(1)
+        arrays = {name: each for name, each in self.arrays.items() if VARIABLES[name][0][0] != BANDS}
+        arrays |= {
+            name: means_of(self.arrays[name], weights[known]) for name in _AVERAGED if name in self.arrays
+        }
+        stated = {**self.attributes, **{name: other.attributes[name] for name in (BAND_WIDTH, FIRST_BAND)}}
+        return replace(self, wavelengths_nm=other.wavelengths_nm[known], arrays=arrays, attributes=stated)
 
     @property
     def places_px(self) -> tuple[NDArray[np.int64] | None, NDArray[np.int64] | None]:

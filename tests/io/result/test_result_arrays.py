@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -115,3 +116,22 @@ def test_coordinates_that_name_no_pixels_are_left_aside(stored: Path, tmp_path: 
     centres = load_result(stored).assign_coords(x=np.arange(200) + 0.5, y=np.zeros(120))
     arrays = load_arrays(save_result(centres, tmp_path / "centres.zarr"))
     assert arrays.in_picture((3, 4)) == (3, 4)
+
+
+def test_a_finer_result_is_averaged_over_the_bands_of_a_coarser_one(stored: Path, tmp_path: Path) -> None:
+    wide_nm, fine = np.arange(430.0, 661.0, 10.0), load_arrays(stored)
+    arrays: dict[str, np.ndarray] = {"reflectance": np.zeros((wide_nm.size, 120, 200), np.float32)}
+    wide = load_arrays(save_result(build_result(arrays, wide_nm, {}), tmp_path / "wide.zarr"))
+    line = (fine.wavelengths_nm == 550).astype(np.float32)
+    fine.arrays["reflectance"][:] = line[:, None, None]
+    fine.arrays["reflectance"][-2, 0, 0] = np.nan
+    found = fine.averaged_like(wide)
+    assert (found.wavelengths_nm.tolist(), found.band_width_nm) == (wide_nm.tolist(), 10.0)
+    assert "reach" not in found.arrays
+    # A line in one band is as much light in a wider one; a band that is missing takes away those on it only.
+    assert found["reflectance"][:, 3, 3].sum() * 10 == pytest.approx(5.0, rel=0.05)
+    assert np.isnan(found["reflectance"][:, 0, 0]).sum() == 2
+    assert wide.averaged_like(fine) is wide
+    assert found.averaged_like(wide) is found
+    few = replace(fine, wavelengths_nm=NM[::4], arrays={"reflectance": fine["reflectance"][::4]})
+    assert few.averaged_like(wide) is few

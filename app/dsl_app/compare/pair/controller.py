@@ -221,6 +221,8 @@ def make_pair(first: Side, second: Side, progress: Progress) -> Pair:
     a, b = first.arrays, second.arrays
     require_same_size(a["depth_mm"], b["depth_mm"])
     require_same_places(a.places_px, b.places_px)
+    a, b = a.averaged_like(b), b.averaged_like(a)
+    first, second = replace(first, arrays=a), replace(second, arrays=b)
     both = a.has_spectra and b.has_spectra
     bands = shared_bands(a.wavelengths_nm, b.wavelengths_nm) if both else []
     if second.truth is not None:
