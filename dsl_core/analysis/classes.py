@@ -130,6 +130,12 @@ def classes_of_library(
     return kept, tuple(notes)
 
 
+def without_missing(bands_nm: Floats, known: NDArray[np.bool_]) -> tuple[str, ...]:
+    """A note on the bands (bands,), nm, that are not known and left out; nothing where all are."""
+    missing = ", ".join(f"{nm:g}" for nm in bands_nm[~known])
+    return (f"{missing} nm: left out, as no pixel has a reflectance there.",) if missing else ()
+
+
 def class_of_pixels(
     name: str,
     reflectance: Cube,
@@ -156,6 +162,11 @@ def class_of_pixels(
             " materials from a library by spectral angle."
         )
     if count == 0:
+        if np.isfinite(reflectance[:, y, x]).any():
+            raise DecodeError(
+                f"{name}: none of its {len(y)} pixels has all {len(reflectance)} bands. Leave out the bands"
+                " that they lack, do not mask single ones, or mark another place."
+            )
         raise DecodeError(f"{name}: none of its {len(y)} pixels has a spectrum. Mark another place.")
     noise = np.mean(spread**2, axis=1)
     averaged = max(min(_PIXELS_TOGETHER / count, 1.0), _IN_COMMON)

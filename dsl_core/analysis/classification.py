@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dsl_core.analysis.area_deviation import class_deviations, not_judged
 from dsl_core.analysis.areas import Cube, Places, depth_relative_std, pixel_areas_mm2
 from dsl_core.analysis.class_table import ClassRow, class_table
-from dsl_core.analysis.classes import FEWEST_BANDS, SpectralClass, class_of_pixels
+from dsl_core.analysis.classes import FEWEST_BANDS, SpectralClass, class_of_pixels, without_missing
 from dsl_core.analysis.classify import Brightness, ClassMap, Limits, Measure, Scores, score
 from dsl_core.analysis.places import Mask, require_spectra
 from dsl_core.errors import DecodeError
@@ -24,7 +24,7 @@ from dsl_core.io.export.class_map import (
 )
 from dsl_core.io.export.common import require_suffix
 from dsl_core.io.export.table import export_table
-from dsl_core.model.result_order import columns_and_rows_px
+from dsl_core.model.result_order import columns_and_rows_px, known_bands
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
@@ -161,6 +161,14 @@ def within_nm(result: xr.Dataset, low_nm: float, high_nm: float) -> xr.Dataset:
             f" reach from {nm[0]:g} to {nm[-1]:g} nm. Give a wider range."
         )
     return result.isel(wavelength_nm=kept)
+
+
+def with_known_bands(result: xr.Dataset) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """The result with the bands that any pixel has, and a note on others; raises `DecodeError`."""
+    require_spectra(result)
+    known = known_bands(result["reflectance"].values)
+    notes = without_missing(result["wavelength_nm"].values, known)
+    return (result.isel(wavelength_nm=np.flatnonzero(known)) if notes else result), notes
 
 
 def areas_of(result: xr.Dataset) -> PixelAreas | None:

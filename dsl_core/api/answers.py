@@ -45,14 +45,19 @@ def classify(
 
     The dataset holds ``class`` (y, x), an index into the coordinate ``label``, ``fit`` and ``margin`` (y, x),
     and for each label ``pixels`` and ``area_mm2``, with ``pixels_std`` and ``area_std_mm2``; the attribute
-    ``notes`` lists what was converted or left out of the library, and why areas are NaN. Raises
-    `CalibrationError` for a library without usable spectra and `DecodeError` for places without spectra, a
-    result that has none, or a measure or brightness that there is not.
+    ``notes`` lists bands left out as no pixel has them, what was converted or left out of the library, and
+    why areas are NaN. Raises `CalibrationError` for a library without usable spectra and `DecodeError` for
+    places without spectra, a result that has none, or a measure or brightness that there is not.
     """
     import xarray as xr
 
     from dsl_core.analysis.classes import classes_of_library, known_classes
-    from dsl_core.analysis.classification import classes_of_masks, classify_result, within_nm
+    from dsl_core.analysis.classification import (
+        classes_of_masks,
+        classify_result,
+        with_known_bands,
+        within_nm,
+    )
     from dsl_core.analysis.classify import Brightness, Limits, Measure
     from dsl_core.analysis.library import read_library
     from dsl_core.analysis.places import require_spectra
@@ -66,8 +71,9 @@ def classify(
         raise DecodeError("There is nothing to compare with. Give a library of spectra, pins, or both.")
     if range_nm is not None:
         result = within_nm(result, *range_nm)
+    result, missing = with_known_bands(result)
     classes: list[SpectralClass] = []
-    notes: list[str] = []
+    notes: list[str] = list(missing)
     if library is not None:
         paths = [library] if not isinstance(library, Sequence) or isinstance(library, str) else library
         read = read_library([path_of(path) for path in paths], grouping, progress=progress)

@@ -103,7 +103,13 @@ def classify(
     json: Json = False,
 ) -> None:
     """Name the material of every pixel, or say 'none of these', with areas in pixels and mm2."""
-    from dsl_core.analysis.classification import ENDINGS, classify_result, within_nm, write_classification
+    from dsl_core.analysis.classification import (
+        ENDINGS,
+        classify_result,
+        with_known_bands,
+        within_nm,
+        write_classification,
+    )
     from dsl_core.analysis.classify import Limits, Measure
     from dsl_core.io.result.result_file import load_result
 
@@ -123,6 +129,7 @@ def classify(
     result = load_result(path)
     if span is not None:
         result = within_nm(result, *parse_span("--range", span))
+    result, missing = with_known_bands(result)
     with output.progress() as progress:
         classes, notes = _classes(path, result, library, library_error, group, pins, at, progress)
         found = classify_result(
@@ -131,7 +138,7 @@ def classify(
         files = [
             file for each in outputs for file in write_classification(result, found, each, overwrite=force)
         ]
-    notes = [*found.notes, *notes]
+    notes = [*found.notes, *missing, *notes]
     for note in notes[:_MOST_NOTES]:
         output.say(note)
     if len(notes) > _MOST_NOTES:

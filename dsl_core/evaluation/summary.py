@@ -14,7 +14,7 @@ from dsl_core.evaluation.depth import DepthScore, depth_score
 from dsl_core.evaluation.scatter import std_of_mean, std_of_rms
 from dsl_core.evaluation.spectral import Peak, SpectralErrors, known_of_first, peak_width, spectral_errors
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, HonestyCheck, check_honesty
-from dsl_core.model.result_order import BANDS, require_wavelengths
+from dsl_core.model.result_order import BANDS, known_bands, require_wavelengths, without_missing_bands
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,6 +129,11 @@ class Evaluation:
         return std_of_mean(self._widths_nm)
 
     def _of_patches(self, figure: str) -> list[float]:
+        if not self.patches and self.unmeasured:
+            raise DecodeError(
+                f"No pixel of {', '.join(self.unmeasured)} has all bands, so that there is no spectrum to"
+                " average over. Leave out the bands that pixels lack, or do not mask single bands."
+            )
         if not self.patches:
             raise DecodeError("There is no patch with a known spectrum to average over.")
         return [getattr(patch, figure) for patch in self.patches]
@@ -141,16 +146,20 @@ class Evaluation:
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
     """Compare a result with what is known; parts without truth or measurement are left out.
 
-    Raises `DecodeError` when truth and result have different sizes or no lit pixel was measured, and
-    `StoreError` where a band of spectra that are compared has no wavelength of its own.
+    Bands that no pixel has are left out. Raises `DecodeError` when truth and result have different sizes or
+    no lit pixel was measured, and `StoreError` where a band of spectra that are compared has no wavelength of
+    its own.
     """
     depth, depth_calibration = _depth(result, truth)
     if truth.material is None or truth.spectra is None or "reflectance" not in result:
         return Evaluation(depth, depth_calibration, (), (), None)
     require_wavelengths(result.coords.get(BANDS, ()), "The result")
     chosen = _chosen(result, truth.material, truth.lit)
+    # A band that no pixel has would leave no pixel a spectrum.
+    spectra = truth.spectra[:, known_bands(result["reflectance"].values)]
+    result = without_missing_bands(result)
     samples = [
-        _Sample.take(result, chosen & (truth.material == index), truth.names[index], truth.spectra[index])
+        _Sample.take(result, chosen & (truth.material == index), truth.names[index], spectra[index])
         for index in (range(len(truth.names)) if truth.targets is None else truth.targets)
     ]
     samples = [sample for sample in samples if sample.wanted]

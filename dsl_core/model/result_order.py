@@ -109,6 +109,20 @@ def with_bits(result: xr.Dataset) -> xr.Dataset:
     return result.assign(whole) if whole else result
 
 
+def known_bands(cube: NDArray[Any]) -> NDArray[np.bool_]:
+    """Bands of a cube (bands, rows, columns) that any pixel has, (bands,); all where no pixel has any."""
+    known = np.array([np.isfinite(band).any() for band in cube], bool)
+    return known if known.any() else ~known
+
+
+def without_missing_bands(result: xr.Dataset) -> xr.Dataset:
+    """A result with the bands that a pixel has a reflectance in; the very dataset where these are all."""
+    if "reflectance" not in result or BANDS not in result["reflectance"].dims:
+        return result
+    known = known_bands(result["reflectance"].transpose(BANDS, ...).values)
+    return result if known.all() else result.isel({BANDS: np.flatnonzero(known)})
+
+
 def with_axes(result: xr.Dataset) -> xr.Dataset:
     """A result with its axes as `VARIABLES` has them and its bands rising; rows and columns stay as they are.
 

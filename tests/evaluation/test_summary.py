@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError, StoreError
-from dsl_core.evaluation.report.scan_report import _patch_note
+from dsl_core.evaluation.report.scan_report import _patch_note, render_report, report_content
 from dsl_core.evaluation.summary import Evaluation, Truth, evaluate, interior
 from dsl_core.evaluation.time_sweep import point_against_truth
 from dsl_core.evaluation.verdict import Goal, deviations, figures, verdicts
@@ -158,3 +158,19 @@ def test_spectra_without_wavelengths_of_their_own_are_not_judged(known: Any) -> 
     same = known.result.assign_coords(wavelength_nm=np.full(known.result.sizes["wavelength_nm"], 500.0))
     with pytest.raises(StoreError, match="not one wavelength for each of its bands"):
         evaluate(same, known.truth)
+
+
+def test_a_band_that_no_pixel_has_leaves_the_others_judged(known: Any) -> None:
+    cube, nm = known.result["reflectance"], known.result["wavelength_nm"]
+    masked = known.result.assign(reflectance=cube.where(nm != nm[20]))
+    found, whole = evaluate(masked, known.truth), evaluate(known.result, known.truth)
+    assert found.patches[0].mean.size == nm.size - 1
+    assert found.mean("rmse") == pytest.approx(whole.mean("rmse"), rel=0.1)
+    page = render_report(report_content("masked", masked, known.truth, found))
+    assert "ramp" in page
+    # Other bands of other pixels: each lacks one.
+    rows, columns = np.indices(cube.shape[1:])
+    chequered = (rows + columns + np.arange(nm.size)[:, None, None]) % 2 == 0
+    holes = known.result.assign(reflectance=cube.where(chequered))
+    with pytest.raises(DecodeError, match="No pixel of ramp, filter has all bands"):
+        evaluate(holes, known.truth).mean("rmse")

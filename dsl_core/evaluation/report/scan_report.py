@@ -27,7 +27,12 @@ from dsl_core.model.calibration.accepted import MISSED_ATTRIBUTE, read_missed
 from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rendered_effects import RenderedEffects
-from dsl_core.model.result_order import BANDS, columns_and_rows_px, require_wavelengths
+from dsl_core.model.result_order import (
+    BANDS,
+    columns_and_rows_px,
+    require_wavelengths,
+    without_missing_bands,
+)
 from dsl_core.optics.colour import hold_colour
 from dsl_core.words import readable
 
@@ -277,7 +282,7 @@ def report_content(
         del attributes["effects"]
     return ReportContent(
         readable(title),
-        result,
+        without_missing_bands(result),
         summary=summary,
         evaluation=evaluation,
         truth=truth,

@@ -77,6 +77,16 @@ class ResultArrays:
         """A spectrum at the bands; raises `CalibrationError` where it does not cover them."""
         return at_bands(curve, self.wavelengths_nm, self.band_width_nm)
 
+    def of_bands(self, chosen: NDArray[np.bool_]) -> ResultArrays:
+        """This result with some of its bands (bands,) only; the very same where these are all."""
+        if chosen.all():
+            return self
+        arrays = {
+            name: each[chosen] if VARIABLES[name][0][0] == BANDS else each
+            for name, each in self.arrays.items()
+        }
+        return replace(self, wavelengths_nm=self.wavelengths_nm[chosen], arrays=arrays)
+
     def averaged_like(self, other: ResultArrays) -> ResultArrays:
         """This result at the bands of another, averaged as far as these are wider; else the very same.
 

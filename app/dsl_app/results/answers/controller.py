@@ -72,8 +72,8 @@ class AnswersController:
         self._start(path.name, way, classes)
 
     def _start(self, name: str, way: Way, classes: _Classes) -> None:
-        result = self.state.result.value
-        if result is None or not result.has_spectra:
+        opened = self.state.result.value
+        if opened is None or not opened.has_spectra:
             self._notifier.tell("info", "Materials need a result with spectra. Open one first.")
             return
         self._request += 1
@@ -81,10 +81,13 @@ class AnswersController:
         title, colours = f"Materials by {name}", {mark.name: mark.colour for mark in self.state.marks.value}
 
         def work(progress: Progress) -> Materials:
-            from dsl_core.analysis.classes import known_classes, marked_by
+            from dsl_core.analysis.classes import known_classes, marked_by, without_missing
             from dsl_core.analysis.classification import Classification, PixelAreas
             from dsl_core.analysis.classify import score
+            from dsl_core.model.result_order import known_bands
 
+            known = known_bands(opened["reflectance"])
+            missing, result = without_missing(opened.wavelengths_nm, known), opened.of_bands(known)
             asked, notes = classes(result, progress)
             std = result.known("reflectance_std")
             found, doubts = known_classes(marked_by(asked, colours), std)
@@ -103,14 +106,14 @@ class AnswersController:
             points_mm, normals, std_mm = (result.known(name) for name in names)
             areas = PixelAreas.of(points_mm, normals, std_mm, result.places_px)
             made = Classification.of(scores, way.limits, way.brightness, areas)
-            return Materials(name, made, (*made.notes, *doubts, *notes))
+            return Materials(name, made, (*made.notes, *missing, *doubts, *notes))
 
         def done(materials: Materials) -> None:
-            if self.state.result.value is result and request == self._request:
+            if self.state.result.value is opened and request == self._request:
                 self.state.materials.set(materials)
 
         def failed(error: Exception) -> None:
-            if self.state.result.value is result and request == self._request:
+            if self.state.result.value is opened and request == self._request:
                 # The map of other classes would pass for the answer.
                 self.state.materials.set(None)
             self._notifier.tell("error", f"There is no map by {name}. {sentence_of(error)}")

@@ -75,6 +75,16 @@ def test_probability_is_the_usual_way_and_a_library_gives_names(bench: Bench, tm
     assert sum(row.pixels for row in materials.found.rows) == materials.found.shown.values.size
 
 
+def test_a_band_that_no_pixel_has_is_left_out_and_told(bench: Bench, tmp_path: Path) -> None:
+    result = bench.state.result.value
+    assert result is not None
+    result.arrays["reflectance"][7] = np.nan
+    bench.control.answers.from_library(_library(tmp_path), Way())
+    materials = _shown(bench)
+    assert (materials.found.scores.best[:, 18:] == 0).mean() > 0.9
+    assert "465 nm: left out, as no pixel has a reflectance there." in materials.notes
+
+
 def test_what_a_library_may_be_off_by_belongs_to_its_classes(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
