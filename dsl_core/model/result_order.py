@@ -44,6 +44,16 @@ def places_px(coordinate: ArrayLike) -> NDArray[np.int64] | None:
     return places if is_whole and len(np.unique(places)) == places.size else None
 
 
+def lie_between_pixels(coordinate: ArrayLike) -> bool:
+    """Whether a coordinate x or y is of finite numbers that are not all whole, as means of pixels have.
+
+    >>> lie_between_pixels([0.5, 2.5]), lie_between_pixels([1.0, 4.0])
+    (True, False)
+    """
+    values = np.asarray(coordinate)
+    return values.dtype.kind == "f" and bool(np.isfinite(values).all() and (values != np.rint(values)).any())
+
+
 def columns_and_rows_px(result: xr.Dataset) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Columns and rows of the camera's picture of a result's pixels; counted from 0 where it does not say."""
     columns, rows = (places_px(result[axis].values) if axis in result.coords else None for axis in ("x", "y"))

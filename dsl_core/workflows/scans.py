@@ -43,7 +43,7 @@ from dsl_core.model.fit import ATTRIBUTE as FIT_ATTRIBUTE
 from dsl_core.model.fit import Fit
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.result_order import places_px
+from dsl_core.model.result_order import lie_between_pixels, places_px
 from dsl_core.model.result_sink import ResultSink, SeenGeometry
 from dsl_core.model.rig import Rig
 from dsl_core.model.scan_proof import ScanProof
@@ -399,7 +399,16 @@ def _bands_of(result: xr.Dataset) -> NDArray[np.float64]:
 
 
 def _truth_of_part(truth: Truth, result: xr.Dataset) -> Truth:
-    """The truth where a result is in the picture; all of it where that is not known, so that sizes decide."""
+    """The truth where a result is in the picture; all of it where that is not known, so that sizes decide.
+
+    Raises `DecodeError` for a result whose pixels are averages.
+    """
+    for axis, size in zip(("x", "y"), truth.size_px or (), strict=False):
+        if axis in result.coords and result.sizes[axis] != size and lie_between_pixels(result[axis].values):
+            raise DecodeError(
+                f"The result's pixels are averages, with {axis} from {result[axis].values[0]:g}, and the truth"
+                " is that of single pixels. Evaluate the result before you average its pixels."
+            )
     plan = plan_of(result.attrs)
     if plan is None or plan.camera_size_px != truth.size_px:
         return truth

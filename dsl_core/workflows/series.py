@@ -23,7 +23,7 @@ from dsl_core.evaluation.time_sweep import (
 from dsl_core.io.result.result_arrays import load_arrays
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.origin import rig_of_notes
-from dsl_core.model.attributes import plan_of
+from dsl_core.model.attributes import plan_of, stated_band_width_nm
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.workflows.scans import truth_of
 
@@ -132,7 +132,8 @@ class TruthReference:
     def _truth(self, path: Path, result: Any) -> Truth:
         bands = result["wavelength_nm"].values if "wavelength_nm" in result.coords else ()
         places = [result[axis].values.tolist() for axis in ("x", "y") if axis in result.coords]
-        key = repr((rig_of_notes(result.attrs), tuple(bands), places))
+        width_nm = stated_band_width_nm(result.attrs, bands)
+        key = repr((rig_of_notes(result.attrs), tuple(bands), width_nm, places))
         if key not in self._known:
             truth = truth_of(result)
             if self._known:

@@ -70,6 +70,20 @@ def test_a_part_that_does_not_say_where_it_is_is_refused(whole: xr.Dataset) -> N
         pipeline.evaluate(whole, truth_of(whole, "twin", other))
 
 
+@pytest.mark.parametrize("step", [{"x": 2}, {"y": 4}, {"x": 2, "y": 2}])
+def test_averaged_pixels_are_told_instead_of_the_camera(whole: xr.Dataset, step: dict[str, int]) -> None:
+    means = whole.drop_vars(["flags", "reach"]).coarsen(step, boundary="trim").mean()  # type: ignore[arg-type]
+    with pytest.raises(
+        DecodeError, match=r"pixels are averages, with [xy] from [01].5, .* before you average"
+    ):
+        dsl.evaluate(means.assign_attrs(whole.attrs))
+
+
+def test_middles_of_pixels_are_the_pixels_where_all_are_there(whole: xr.Dataset) -> None:
+    middles = whole.assign_coords(x=whole["x"] + 0.5, y=whole["y"] + 0.5)
+    assert dsl.evaluate(middles).mean("rmse") == dsl.evaluate(whole).mean("rmse")
+
+
 def test_a_sweep_compares_one_part_with_the_truth(whole: xr.Dataset, tmp_path: Path) -> None:
     def saved(name: str, left: int) -> Path:
         return save_result(whole.isel(x=slice(left, left + 30)), tmp_path / f"{name}.zarr")
