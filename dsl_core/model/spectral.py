@@ -117,13 +117,12 @@ class BandValues:
     std: Floats
 
 
-def band_widths_nm(bands_nm: Floats, stated_nm: ArrayLike | None = None) -> Floats:
+def band_widths_nm(bands_nm: ArrayLike, stated_nm: ArrayLike | None = None) -> Floats:
     """Full width at half height (nm) of bands (bands,): the distance of bands where nobody states it."""
+    nm = np.asarray(bands_nm, np.float64)
     if stated_nm is not None:
-        return np.broadcast_to(np.asarray(stated_nm, np.float64), len(bands_nm))
-    if len(bands_nm) < 2:
-        return np.ones(len(bands_nm))
-    return np.abs(np.gradient(np.asarray(bands_nm, np.float64)))
+        return np.broadcast_to(np.asarray(stated_nm, np.float64), len(nm))
+    return np.abs(np.gradient(nm)) if len(nm) > 1 else np.ones(len(nm))
 
 
 def band_weights(nm: Floats, bands_nm: Floats, widths_nm: Floats) -> Floats:

@@ -406,8 +406,8 @@ def _truth_of_part(truth: Truth, result: xr.Dataset) -> Truth:
     for axis, size in zip(("x", "y"), truth.size_px or (), strict=False):
         if axis in result.coords and result.sizes[axis] != size and lie_between_pixels(result[axis].values):
             raise DecodeError(
-                f"The result's pixels are averages, with {axis} from {result[axis].values[0]:g}, and the truth"
-                " is that of single pixels. Evaluate the result before you average its pixels."
+                f"The result's pixels are averages, with {axis} from {result[axis].values[0]:g}, and truth"
+                " is known of single pixels. Evaluate the result before you average its pixels."
             )
     plan = plan_of(result.attrs)
     if plan is None or plan.camera_size_px != truth.size_px:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.spectral import compare, peak_width, spectral_errors
@@ -137,10 +138,10 @@ def test_stated_deviations_are_those_of_figures_of_noisy_spectra(offset: float, 
     correlation, std = np.exp(-lags / 3.0), 0.01 + 0.005 * np.cos(GRID / 60)
     measured = TRUTH[:, 0] + offset * np.cos(GRID / 25)
     curve = SpectralCurve.of(GRID, TRUTH[:, 0])
-    stated = {"std": std}
+    stated: NDArray[np.float64] | None = std
     if of_reference:
-        stated, curve = {}, curve.model_copy(update={"std": tuple(std)})
-    found = compare(measured, GRID, curve, correlation=correlation, **stated)
+        stated, curve = None, curve.model_copy(update={"std": tuple(std)})
+    found = compare(measured, GRID, curve, stated, correlation)
     noise = np.random.default_rng(3).multivariate_normal(
         np.zeros(len(GRID)), correlation * np.outer(std, std), 4000
     )

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.model.result import build_result
@@ -40,7 +42,7 @@ def test_bands_of_different_widths_are_compared_as_the_wider_ones(give: Give, tm
     for step_nm in (5.0, 10.0):
         nm = np.arange(430.0, 661.0, step_nm)
         spectrum = at_bands(edge, nm).values.astype(np.float32)
-        arrays = {
+        arrays: dict[str, NDArray[Any]] = {
             "depth_mm": np.full((6, 9), 700, np.float32),
             "reflectance": np.broadcast_to(spectrum[:, None, None], (nm.size, 6, 9)).copy(),
         }

@@ -72,10 +72,8 @@ def test_a_part_that_does_not_say_where_it_is_is_refused(whole: xr.Dataset) -> N
 
 @pytest.mark.parametrize("step", [{"x": 2}, {"y": 4}, {"x": 2, "y": 2}])
 def test_averaged_pixels_are_told_instead_of_the_camera(whole: xr.Dataset, step: dict[str, int]) -> None:
-    means = whole.drop_vars(["flags", "reach"]).coarsen(step, boundary="trim").mean()  # type: ignore[arg-type]
-    with pytest.raises(
-        DecodeError, match=r"pixels are averages, with [xy] from [01].5, .* before you average"
-    ):
+    means = whole.drop_vars(["flags", "reach"]).coarsen(step, boundary="trim").mean()
+    with pytest.raises(DecodeError, match=r"are averages, with [xy] from [01].5, .* before you average"):
         dsl.evaluate(means.assign_attrs(whole.attrs))
 
 
