@@ -56,18 +56,27 @@ class MovementReport:
 
 
 def pick_reference_shots(done: Iterable[Shot]) -> list[Shot]:
-    """Two old shots that show most: a white one, if any, and the last of the code before it."""
+    """Two old shots that show most: the last white one, if any, and the last of a code.
+
+    The first picture of a code is none of them, as the next one says what is dark in it.
+    """
     shots = list(done)
     white = [shot for shot in shots if shot.role == "white"][-1:]
-    code = [shot for shot in shots if shot.role == "code"][-1:]
+    code = [shot for shot in shots if shot.role == "code" and shot.pattern > 0][-1:]
     return [*code, *white] or shots[-2:]
 
 
 def pick_dark_shots(done: Iterable[Shot]) -> list[Shot]:
-    """Old shots in one of which every pixel is dark: the last black, or else the first pair of the code."""
-    shots = list(done)
+    """Old shots in one of which every pixel is dark: each setting's last black, or its code's first pair."""
+    by_setting: dict[int, list[Shot]] = {}
+    for shot in done:
+        by_setting.setdefault(shot.setting, []).append(shot)
+    return [shot for shots in by_setting.values() for shot in _dark_of(shots)]
+
+
+def _dark_of(shots: list[Shot]) -> list[Shot]:
     black = [shot for shot in shots if shot.role == "black"][-1:]
-    pair = [shot for shot in shots if shot.role == "code" and shot.pattern < 2][:2]
+    pair = [shot for shot in shots if shot.role == "code" and shot.pattern < 2]
     return black or (pair if len(pair) == 2 else [])
 
 
@@ -80,7 +89,8 @@ def check_movement(
 ) -> MovementReport:
     """Take ``shots`` again and compare them with the stored ones; nothing is stored.
 
-    Stored shots that are ``dark`` show the black level of a camera that is not calibrated.
+    Stored shots that are ``dark`` show what a camera that is not calibrated sees without the projector's
+    light, which grows with the exposure: those of a setting serve its own shots.
 
     Raises `DeviceError` when the rig fails, `StoreError` when a stored frame is damaged, ``ValueError``
     without shots.
@@ -92,12 +102,18 @@ def check_movement(
     known = rig.calibration.sensor if rig.calibration else None
     sensor = known or usual_sensor(rig.camera.info.bit_depth)
     # Light of the room is in the darkest pictures, too.
-    stored = [] if known else [source.read(shot) for shot in dark]
-    black = _blocks(np.minimum.reduce(stored)) if stored else np.array(sensor.black_level_dn)
+    darkest: dict[int, NDArray[np.uint16]] = {}
+    for shot in () if known else dark:
+        pixels = source.read(shot)
+        darkest[shot.setting] = np.minimum(pixels, darkest.get(shot.setting, pixels))
+    black = {setting: _blocks(pixels) for setting, pixels in darkest.items()}
+    unknown = np.array(sensor.black_level_dn)
+
+    def light(shot: Shot, pixels: NDArray[np.uint16]) -> NDArray[np.float64]:
+        return np.asarray(_blocks(pixels) - black.get(shot.setting, unknown))
+
     try:
-        pairs = [
-            (_blocks(source.read(shot)) - black, _blocks(taker.take(shot).pixels) - black) for shot in chosen
-        ]
+        pairs = [(light(shot, source.read(shot)), light(shot, taker.take(shot).pixels)) for shot in chosen]
     finally:
         taker.show_black()
     old_light = sum(float(old.sum()) for old, _ in pairs)

@@ -123,11 +123,42 @@ def test_the_light_of_a_camera_that_is_not_calibrated_is_what_exceeds_its_dark_p
     assert report.is_stable == (light == 1)
 
 
+@pytest.mark.parametrize("exposures_ms", [(10.0, 200.0), (200.0, 10.0)])
+@pytest.mark.parametrize("light", [0.9, 1.0])
+@pytest.mark.parametrize(
+    ("code_settings", "stopped_after"), [((0, 1), 14), ((0, 1), 17), ((0, 1), 28), ((0,), 18), ((1,), 16)]
+)
+def test_light_of_the_room_is_that_of_the_setting(
+    exposures_ms: tuple[float, float], light: float, code_settings: tuple[int, ...], stopped_after: int
+) -> None:
+    """Each setting of a camera that is not calibrated sees the room as brightly as it exposes for."""
+    settings = tuple(Setting(exposure_ms=ms, level=0.4) for ms in exposures_ms)
+    plan = PLAN.model_copy(update={"settings": settings, "code_settings": code_settings})
+
+    def taken(seed: int, light: float) -> MemorySink:
+        rng, sink = np.random.default_rng(seed), MemorySink(plan)
+        for shot in plan.shots():
+            image = np.kron(pattern_image(plan, shot)[..., 1] > 0, np.ones((2, 2)))
+            scene = np.pad(500.0 * light * image, ((6, 6), (0, 0))) + 2.0 * shot.exposure_ms
+            noisy = 260 + scene + rng.normal(0, 3, scene.shape)
+            sink.write(shot, Frame(np.round(noisy).clip(0, 4095).astype(np.uint16), shot.exposure_ms))
+        return sink
+
+    done = list(plan.shots())[:stopped_after]
+    rig = replace(replay_rig(taken(2, light)), calibration=None)
+    report = check_movement(
+        rig, taken(1, 1.0), pick_reference_shots(done), pattern_image, pick_dark_shots(done)
+    )
+    assert report.brightness_ratio == pytest.approx(light, abs=0.01)
+    assert report.is_stable == (light == 1)
+
+
 def test_black_is_dark_and_so_is_a_pair_of_the_code_but_no_single_picture() -> None:
     shots = list(PLAN.shots())
     assert [shot.role for shot in pick_dark_shots(shots)] == ["black"]
     assert pick_dark_shots(shots[:3]) == shots[:2]
     assert pick_dark_shots(shots[:1]) == []
+    assert pick_reference_shots(shots[:1]) == shots[:1]
 
 
 def test_the_noise_of_dim_pictures_is_no_change_of_structure() -> None:
