@@ -117,7 +117,12 @@ def _relative(pictures: Sequence[Floats]) -> tuple[Lines, float]:
 
 
 def _noise(values: Floats) -> float:
-    """Standard deviation of noise along lines (pictures, lines, length), by the picture that varies least."""
+    """Standard deviation of noise along lines (pictures, lines, length), by the picture that varies least.
+
+    0 of lines that are too short to tell.
+    """
+    if values.shape[-1] < 5:
+        return 0.0
     # Every second pixel of a line has one colour of a mosaic.
     bends = np.abs(values[..., 4:] - 2 * values[..., 2:-2] + values[..., :-4]).reshape(len(values), -1)
     return float(np.percentile(bends, QUIET, axis=1).min()) / QUIET_SIGMAS

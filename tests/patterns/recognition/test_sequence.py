@@ -29,6 +29,13 @@ def _recognised(pictures: Pictures, slots: Slots | None = None) -> Recognised | 
     return recognise(taker.finish(255.0), slots or tuple(range(len(pictures))))
 
 
+@pytest.mark.parametrize("rows", [1, 4])
+def test_strips_of_a_few_rows_are_read_as_taller_pictures_are(rows: int) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    strip = [picture[:rows] for picture in (*pictures, white, black)]
+    assert _stripes(_recognised(strip), "columns").bits == 7
+
+
 def _stripes(found: Recognised | None, axis: str) -> StripeReading:
     assert found is not None
     reading = next(b.reading for b in found.blocks if b.axis == axis and b.kind == "stripes")
