@@ -36,8 +36,15 @@ WIDE = 0.2
 UNKNOWN_SHARE, UNKNOWN = 0.5, 0.05
 #: So is one beyond both of these, if it is so many times less certain than the pixels that it would name.
 VAGUE_SHARE, VAGUE, VAGUE_RATIO = 0.1, 0.03, 3.0
-#: Pixels with these flags get no class: their spectrum is absent, cut off, or that of two materials.
-NOT_JUDGED = SPECTRUM_INVALID | Flag.SATURATED | Flag.POOR_FIT
+#: Pixels with one of these flags get no class, nor those with all of the others: their spectrum is absent or
+#: that of two materials, or the peak of their lines is cut off. Of others, only a frame is left out.
+_NOT_JUDGED, _CUT_OFF = SPECTRUM_INVALID | Flag.POOR_FIT, Flag.SATURATED | Flag.NOT_REFINED
+
+
+def is_judged(flags: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Whether pixels with these flags get a class, in the shape of ``flags``."""
+    is_cut_off = (flags & int(_CUT_OFF)) == int(_CUT_OFF)
+    return np.asarray(((flags & int(_NOT_JUDGED)) == 0) & ~is_cut_off)
 
 
 @dataclass(frozen=True)
@@ -148,8 +155,8 @@ def class_of_pixels(
     Cubes (bands, rows, columns), mask and ``flags`` (rows, columns): pixels that get no class define none,
     unless there are no others. Raises `DecodeError` where no pixel has a spectrum with deviations.
     """
-    if flags is not None and (mask & ((flags & int(NOT_JUDGED)) == 0)).any():
-        mask = mask & ((flags & int(NOT_JUDGED)) == 0)
+    if flags is not None and (judged := mask & is_judged(flags)).any():
+        mask = judged
     y, x = np.nonzero(mask)
     values, spread = reflectance[:, y, x].astype(np.float64), std[:, y, x].astype(np.float64)
     has_spectrum = np.isfinite(values).all(0)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from dsl_core.analysis.alike import groups_alike, nearest_shapes
 from dsl_core.analysis.band_noise import band_correlation, usual_correlation
-from dsl_core.analysis.classes import FEWEST_BANDS, NOT_JUDGED, SpectralClass, marked_by, shared_names
+from dsl_core.analysis.classes import FEWEST_BANDS, SpectralClass, is_judged, marked_by, shared_names
 from dsl_core.analysis.likelihood import Block, class_fit
 from dsl_core.analysis.mark_colours import Ground, mark_colour
 from dsl_core.errors import DecodeError
@@ -182,7 +182,7 @@ def score(
     """
     classes = marked_by(shared_names(classes), {})
     _check(reflectance, std, classes, measure)
-    judged = ((flags & int(NOT_JUDGED)) == 0) & np.isfinite(reflectance).all(0)
+    judged = is_judged(flags) & np.isfinite(reflectance).all(0)
     progress = progress or NoProgress()
     names = tuple(each.name for each in classes)
     scores = Scores(

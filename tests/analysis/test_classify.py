@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,21 @@ def test_a_material_that_is_in_no_class_is_none_of_these(cube: ChartCube) -> Non
 def test_flags_are_respected(cube: ChartCube) -> None:
     assert cube.flags[0, 0] == Flag.POOR_FIT
     assert _map(cube, _classes(cube)).values[0, 0] == 0
+
+
+def test_a_saturated_frame_leaves_a_pixel_its_material_unless_its_column_is_coarse(cube: ChartCube) -> None:
+    flags = np.zeros_like(cube.flags)
+    flags[1], flags[2] = Flag.SATURATED, Flag.SATURATED | Flag.NOT_REFINED
+    flags[3] = Flag.NOT_REFINED
+    shown = _map(replace(cube, flags=flags), _classes(cube)).values
+    assert (shown[[0, 1, 3]] > 0).all()
+    assert (shown[2] == 0).all()
+    mask = np.isin(np.arange(len(flags)), [1, 2])[:, None] & np.ones(flags.shape, bool)
+    kept = class_of_pixels("kept", cube.reflectance, cube.std, mask, flags)
+    mask[2] = False
+    np.testing.assert_array_equal(
+        kept.mean, class_of_pixels("kept", cube.reflectance, cube.std, mask, flags).mean
+    )
 
 
 def test_what_only_brightness_tells_apart_is_undecided_when_brightness_is_free(cube: ChartCube) -> None:

@@ -54,7 +54,7 @@ HUBER, ROUNDS = 2.0, 6
 #: Pairs and blocks of a surface that say something.
 FEWEST_PAIRS, FEWEST_BLOCKS = 100, 5
 #: Pixels whose brightness or normal means nothing, and the least light that falls on a surface.
-_DOUBTFUL = Flag.SATURATED | Flag.DEPTH_EDGE | Flag.NOT_REFINED | Flag.CODES_DISAGREE | Flag.UNUSUAL_PEAK
+_DOUBTFUL = Flag.DEPTH_EDGE | Flag.NOT_REFINED | Flag.CODES_DISAGREE | Flag.UNUSUAL_PEAK
 LEAST_SHADING = 0.1
 _NM = np.arange(400.0, 701.0)
 

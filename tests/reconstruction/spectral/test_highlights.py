@@ -164,8 +164,18 @@ def test_too_few_pixels_say_nothing(ball: tuple[Rig, Geometry]) -> None:
     rig, geometry = ball
     towards = towards_mirror(rig, geometry)
     seen = lit(rig, geometry, coloured(rig, geometry, 0.02))
-    saturated = replace(seen, flags=np.full_like(seen.flags, int(Flag.SATURATED)))
-    assert find_highlight(rig, saturated, towards) is None
+    coarse = replace(seen, flags=np.full_like(seen.flags, int(Flag.SATURATED | Flag.NOT_REFINED)))
+    assert find_highlight(rig, coarse, towards) is None
+
+
+def test_a_saturated_line_is_as_bright_as_its_slopes_say_so_its_pixels_count(
+    ball: tuple[Rig, Geometry],
+) -> None:
+    rig, geometry = ball
+    towards = towards_mirror(rig, geometry)
+    seen = lit(rig, geometry, coloured(rig, geometry, 0.02))
+    saturated = replace(seen, flags=seen.flags | np.uint16(int(Flag.SATURATED)))
+    assert find_highlight(rig, saturated, towards) == find_highlight(rig, seen, towards)
 
 
 def test_a_camera_without_colours_cannot_tell_white_light(ball: tuple[Rig, Geometry]) -> None:
