@@ -22,6 +22,8 @@ _WAVENUMBER = re.compile(r"wave ?number|cm\s?(?:\^?-1|⁻¹)|1/cm", re.IGNORECAS
 _PERCENT = re.compile(
     r"(?:(?<!\d)(?<!\d )|(?<![\d.])0 ?(?:-|–|\.\.+|…|to) ?100 ?)(?:%|percent)", re.IGNORECASE
 )
+#: The unit of spectrometers, which only a title has behind the number of a sample: "leaf 12 %R".
+_PERCENT_R = re.compile(r"% ?[RT]\b")
 _UNIT_LINE = re.compile(r"\W*(?:y[- ]?)?units?\b", re.IGNORECASE)
 #: In the order in which they are tried; a unit of power decides before all of them.
 _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
@@ -102,6 +104,7 @@ def _quantity(text: str, everywhere: bool) -> tuple[Quantity, float, bool]:
         return "radiance", _to_radiance(text[: unit.start()], unit[1], unit[2]), True
     if unit is not None and re.search(r"/ ?\(?c?m|m\^?-?2|m²|m⁻²", unit[2]):
         return "irradiance", 1.0, True
+    said_percent = everywhere and bool(_PERCENT.search(text) or _PERCENT_R.search(text))
     for quantity, words in _WORDS:
         found = words.search(text)
         if found is None:
@@ -109,10 +112,10 @@ def _quantity(text: str, everywhere: bool) -> tuple[Quantity, float, bool]:
         near = text if everywhere else text[found.start() : found.start() + 40].split("\n")[0]
         before = text[: found.start()].rpartition("\n")[2]
         is_share = quantity in ("reflectance", "transmittance")
-        if is_share and _PERCENT.search(f"{before}{near}"):
+        if is_share and (said_percent or _PERCENT.search(f"{before}{near}")):
             return quantity, 0.01, True
         return quantity, 1.0, is_share and bool(re.search(r"\[1(?:\.0)?\]|\(1\)|0 ?[-.…] ?1\b", near))
-    if everywhere and _PERCENT.search(text):
+    if said_percent:
         return "reflectance", 0.01, True
     return "unstated", 1.0, False
 

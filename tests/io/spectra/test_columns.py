@@ -59,7 +59,11 @@ def test_a_column_that_counts_rows_under_no_title_is_no_spectrum(tmp_path: Path)
         ("Reflectance, 0..100%", "Wavelength,sample", 0.01),
         ("Unit: 0 to 100 percent", "Wavelength,Reflectance", 0.01),
         ("own", "Wavelength,Reflectance (0–100 %)", 0.01),
+        ("own", "Wavelength,sample 12 %R", 0.01),
+        ("own", "Wavelength,leaf 3 % T", 0.01),
+        ("own", "Wavelength,Reflectance of leaf 3 %R", 0.01),
         # None of these is the unit of the values.
+        ("White: reflectance 99 %R", "Wavelength,Reflectance", 1.0),
         ("own", "Wavelength,Spectralon 99%", 1.0),
         ("own", "Wavelength,Reflectance of Spectralon 99 %", 1.0),
         ("Reflectance, white 10.0-100 %", "Wavelength,sample", 1.0),
