@@ -31,8 +31,9 @@ NEAR = 2
 #: to agree, or several to differ by so many deviations of columns elsewhere, which are so far from them.
 MOST_SKIPPED, FEWEST_EDGES, SIGMAS = 0.2, 20.0, 4.0
 #: Where this share of neighbouring pixels is the same number of columns apart, two or more, all edges agree
-#: anyway: only deviations count then.
-REGULAR = 0.9
+#: anyway: only deviations count then. So it is where this share of pixels so many apart is 4, 8, 12...
+#: columns apart, as edges are: at pixels 4/3 of a column wide, each is at the same place between them.
+REGULAR, REPEATED, APART = 0.9, 0.95, (3, 5, 7)
 #: Columns elsewhere: those in one row are alike if pixels are 2, 4 or 8 columns apart.
 ELSEWHERE = np.array([[side * away for away in range(6 + k, 30, 4) for side in (-1, 1)] for k in range(4)])
 #: Pixels side by side whose columns are further apart are on different surfaces.
@@ -65,8 +66,7 @@ def displaced_code(
     sides = [_mean(is_once & _near(side), named) for side in (is_never, is_twice)]
     # Between fine stripes there are none, nor are there in each row of a coarse picture: all together then.
     is_fine = 2 * (is_once & _near(is_never)).sum(1) < is_never.sum(1)
-    skipped, is_regular = _skipped(column)
-    skips = skipped > MOST_SKIPPED
+    skips = _skipped(column) > MOST_SKIPPED
     all_together = _mean(is_never | is_twice | (is_once & _near(is_never | is_twice)), named)
     least, most = (np.where(is_fine | skips, all_together, of(*sides)) for of in (np.minimum, np.maximum))
     expected = least * is_never.sum(1)
@@ -75,21 +75,34 @@ def displaced_code(
     if skips:
         edges = is_twice @ (named > 0).astype(np.float64) / [abs(one.columns) for one in tried]
         deviations = _deviations(named, is_never, is_twice)
-        told &= ((edges >= FEWEST_EDGES) & (not is_regular)) | ((edges > 1) & (deviations > SIGMAS))
+        told &= ((edges >= FEWEST_EDGES) & (not _is_regular(column))) | ((edges > 1) & (deviations > SIGMAS))
     if not told.any():
         return None
     return tried[int(np.where(told, expected - never, -1).argmax())]
 
 
-def _skipped(column: NDArray[np.integer]) -> tuple[float, bool]:
-    """Share of the columns that a picture sees which it skips from pixel to pixel, and whether regularly."""
-    steps = np.abs(np.diff(column, axis=1))
-    steps = steps[(column[:, 1:] >= 0) & (column[:, :-1] >= 0) & (steps <= STEP_PX)]
-    times = np.bincount(steps, minlength=STEP_PX + 1)
+def _skipped(column: NDArray[np.integer]) -> float:
+    """Share of the columns that a picture sees which it skips from pixel to pixel."""
+    times = _steps(column, 1)
     moves = int(times[1:].sum())
-    if not moves:
-        return 1.0, False
-    return 1.0 - moves / float(steps.sum()), bool(times[2:].max() > REGULAR * times.sum())
+    return 1.0 - moves / float(times @ np.arange(times.size)) if moves else 1.0
+
+
+def _is_regular(column: NDArray[np.integer]) -> bool:
+    """Whether pixels see columns at the same places of all stripes."""
+    next_ones = _steps(column, 1)
+    if next_ones[2:].max() > REGULAR * next_ones.sum():
+        return True
+    alike = ((_steps(column, apart), apart // 4 * 4 + 4) for apart in APART)
+    return any(times[more::4].max() > REPEATED * times.sum() for times, more in alike)
+
+
+def _steps(column: NDArray[np.integer], apart: int) -> NDArray[np.int64]:
+    """How many pixels so many apart in a row are 0, 1, 2... columns apart."""
+    left, right = column[:, :-apart], column[:, apart:]
+    steps = np.abs(right - left)[(left >= 0) & (right >= 0)]
+    most = STEP_PX * apart
+    return np.bincount(steps[steps <= most], minlength=most + 1)
 
 
 def _deviations(

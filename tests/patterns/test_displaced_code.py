@@ -80,6 +80,18 @@ def test_pixels_a_whole_number_of_columns_apart_are_no_displacement(
         assert displaced_code(code, SIZE_PX, column[:, first::apart]) is None
 
 
+@pytest.mark.parametrize("code", [GRAY, XorCode(rows=False)])
+@pytest.mark.parametrize(("columns", "pixels"), [(4, 3), (8, 3), (8, 5), (16, 3)])
+def test_columns_that_repeat_every_few_pixels_are_no_displacement(
+    code: BinaryCode, columns: int, pixels: int
+) -> None:
+    apart = columns / pixels
+    for first in range(columns):
+        at = np.arange(first / pixels + 18, 600, apart) + 1e-6
+        column = np.tile(seen(0, 0, code, camera_px=590, rows=1)[0][(at - 18).astype(int)], (96, 1))
+        assert displaced_code(code, SIZE_PX, column) is None
+
+
 def test_a_surface_that_ends_at_the_edge_of_a_stripe_is_no_displacement() -> None:
     column = seen(0, 0)
     assert displaced_code(GRAY, SIZE_PX, np.where((column >= 505) & (column < 512), -1, column)) is None
