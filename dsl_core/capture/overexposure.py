@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from dsl_core.devices.base import CameraInfo, DeviceRig
 from dsl_core.model.plan import CapturePlan, Shot
-from dsl_core.model.rig import Sensor
-from dsl_core.optics.sensor import end_near_full
+from dsl_core.model.rig import BayerPattern, Sensor
+from dsl_core.optics.sensor import bayer_channels, end_near_full
 
 #: Share of the picture from which on a person is told; highlights and a wall behind an object are usual.
 MOST_OVEREXPOSED = 0.5
@@ -40,8 +40,9 @@ def by_colour(pixels: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger
 class ExposureWatch:
     """Takes the frames of a scan in their order; ``found`` says how much of white is overexposed, if much."""
 
-    def __init__(self, plan: CapturePlan, full_scale_dn: int) -> None:
+    def __init__(self, plan: CapturePlan, full_scale_dn: int, bayer: BayerPattern) -> None:
         """Pixels that reach ``full_scale_dn``, or where white ends just below it, are saturated."""
+        self._bayer: BayerPattern = bayer
         self._waits_for = {shot.index for shot in plan.shots() if shot.role == "white"}
         self._full_scale_dn = full_scale_dn
         self._always: NDArray[np.bool_] | None = None
@@ -53,7 +54,8 @@ class ExposureWatch:
             return
         self._waits_for.discard(shot.index)
         # One colour is enough to tell a code and to find a line.
-        self._full_scale_dn = end_near_full(pixels, self._full_scale_dn)
+        channels = bayer_channels(self._bayer, *pixels.shape)
+        self._full_scale_dn = end_near_full(pixels, self._full_scale_dn, channels)
         saturated = by_colour(pixels).min(axis=0) >= self._full_scale_dn
         self._always = saturated if self._always is None else self._always & saturated
         share = float(self._always.mean())

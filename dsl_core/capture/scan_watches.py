@@ -33,7 +33,7 @@ class ScanWatches:
     @classmethod
     def of(cls, rig: DeviceRig, plan: CapturePlan, prove: bool, is_metered: bool) -> ScanWatches:
         """Watches for a scan of which they have seen nothing yet."""
-        exposure = None if is_metered else ExposureWatch(plan, full_scale_dn(rig))
+        exposure = None if is_metered else ExposureWatch(plan, full_scale_dn(rig), rig.camera.info.bayer)
         if not prove:
             return cls(exposure)
         camera, sensor = rig.camera.info, rig.calibration.sensor if rig.calibration else None

@@ -24,6 +24,8 @@ ABOVE = 0.01
 OTHER_COLOUR = 0.1
 #: Cameras as they are end above this share of their bit depth's range; below it, something cuts them off.
 NEAR_FULL = 0.9
+#: Of one colour, those below this share are ends only where there is also light just below them.
+NEARLY_FULL = 0.98
 
 
 def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.int64]:
@@ -92,13 +94,13 @@ def end_of(total: NDArray[np.int64], low_dn: int) -> int | None:
 
 
 def end_near_full(
-    pixels: NDArray[np.unsignedinteger], full_scale_dn: int, channels: NDArray[np.integer] | None = None
+    pixels: NDArray[np.unsignedinteger], full_scale_dn: int, channels: NDArray[np.integer]
 ) -> int:
     """Where the values of a picture end: ``full_scale_dn``, or a little below it where many pixels have that.
 
     Many cameras saturate below the largest number of their bit depth, as those do whose 12 bits are moved up
     to 16. A picture without saturated pixels does not say so. Light without noise piles up as well, but in
-    one colour alone: ``channels`` are those of the pixels, in their shape.
+    one colour alone, and with no light just below: ``channels`` are those of the pixels, in their shape.
     """
     low_dn = int(np.ceil(NEAR_FULL * full_scale_dn))
     bright = pixels[pixels >= low_dn]
@@ -107,10 +109,14 @@ def end_near_full(
     end = end_of(np.bincount(np.minimum(bright, full_scale_dn), minlength=full_scale_dn + 1), low_dn)
     if end is None:
         return full_scale_dn
-    if channels is not None and channels.min() < channels.max():
+    if channels.min() < channels.max():
         piled = np.sort(np.bincount(channels[pixels == end], minlength=3))
         return end if piled[1] >= OTHER_COLOUR * piled.sum() else full_scale_dn
-    return end
+    # Little noise reaches the next value, and no further.
+    far = max(end // 100, 8)
+    just_below = (pixels >= end - far) & (pixels <= end - far // 2)
+    is_end = end >= NEARLY_FULL * full_scale_dn or np.count_nonzero(just_below) >= SEEN
+    return end if is_end else full_scale_dn
 
 
 def digitise(

@@ -10,6 +10,8 @@ import pytest
 from dsl_core.capture.overexposure import MOST_OVEREXPOSED, ExposureWatch
 from dsl_core.capture.runner import Status
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
+from dsl_core.model.rig import BayerPattern
+from dsl_core.optics.sensor import bayer_channels
 from dsl_core.pipeline import meter, open_scan, scan
 from dsl_core.simulation.sim_devices import open_twin
 
@@ -40,7 +42,7 @@ def white(share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
     ],
 )
 def test_what_no_setting_spares_counts(dark: float, bright: float, told: str) -> None:
-    watch = ExposureWatch(PLAN, FULL_DN)
+    watch = ExposureWatch(PLAN, FULL_DN, "RGGB")
     for shot in PLAN.shots():
         share = 1.0 if shot.role != "white" else dark if shot.setting == 0 else bright
         watch.add(shot, white(share))
@@ -48,15 +50,41 @@ def test_what_no_setting_spares_counts(dark: float, bright: float, told: str) ->
 
 
 def test_what_one_colour_still_measures_does_not_count() -> None:
-    watch, pixels = ExposureWatch(PLAN, FULL_DN), white(1.0)
+    watch, pixels = ExposureWatch(PLAN, FULL_DN, "RGGB"), white(1.0)
     pixels[::2, ::2] = FULL_DN - 1
     for shot in PLAN.shots():
         watch.add(shot, pixels)
     assert watch.found == ""
 
 
+@pytest.mark.parametrize(("bayer", "light"), [("RGGB", (0.62, 0.94, 0.55)), ("MONO", (0.94, 0.94, 0.94))])
+@pytest.mark.parametrize("full_dn", [255, 1023, 65535])
+@pytest.mark.parametrize("noise_dn", [0.0, 0.15])
+def test_white_without_noise_just_below_full_scale_is_not_saturated(
+    bayer: BayerPattern, light: tuple[float, float, float], noise_dn: float, full_dn: int
+) -> None:
+    watch = ExposureWatch(PLAN, full_dn, bayer)
+    seen = np.array(light)[bayer_channels(bayer, 60, 90)] * full_dn
+    seen += np.random.default_rng(0).normal(0, noise_dn, seen.shape)
+    for shot in PLAN.shots():
+        watch.add(shot, np.rint(seen).astype(np.uint16))
+    assert watch.found == ""
+
+
+@pytest.mark.parametrize("full_dn", [255, 4095])
+@pytest.mark.parametrize(("ends_share", "told"), [(0.92, "69%"), (0.996, "67%")])
+def test_white_of_one_colour_that_ends_below_full_scale_is_saturated_there(
+    full_dn: int, ends_share: float, told: str
+) -> None:
+    watch, end_dn = ExposureWatch(PLAN, full_dn, "MONO"), round(ends_share * full_dn)
+    light = np.tile(np.linspace(0.0, 3.0, 300) * full_dn, (50, 1))
+    for shot in PLAN.shots():
+        watch.add(shot, np.minimum(light, end_dn).astype(np.uint16))
+    assert told in watch.found
+
+
 def test_white_that_ends_below_full_scale_is_saturated_there() -> None:
-    watch, pixels = ExposureWatch(PLAN, FULL_DN), white(1.0) - 3
+    watch, pixels = ExposureWatch(PLAN, FULL_DN, "RGGB"), white(1.0) - 3
     for shot in PLAN.shots():
         watch.add(shot, pixels)
     assert "100%" in watch.found

@@ -128,9 +128,9 @@ def test_values_end_where_bright_pixels_pile_up_just_below_full_scale(bits: int,
     )
     light = np.tile(np.linspace(0.0, 1.3 * full_dn, 200, dtype=np.float32), (50, 1))
     values = digitise(sensor, light, np.random.default_rng(0))
-    assert end_near_full(values, full_dn) == ends_dn
+    assert end_near_full(values, full_dn, np.zeros_like(values)) == ends_dn
     values[0, :2] = full_dn
-    assert end_near_full(values, full_dn) == ends_dn, "hot pixels are no light"
+    assert end_near_full(values, full_dn, np.zeros_like(values)) == ends_dn, "hot pixels are no light"
 
 
 @pytest.mark.parametrize(("light", "ends_dn"), [(0.97, 4095), (1.5, 4095), (1.5, 3000)])
@@ -139,4 +139,4 @@ def test_neither_noise_nor_full_scale_nor_what_cuts_values_off_is_such_an_end(
 ) -> None:
     sensor = Sensor(black_level_dn=0.0, saturation_dn=ends_dn)
     values = digitise(sensor, np.full((60, 90), light * 4095, np.float32), np.random.default_rng(0))
-    assert end_near_full(values, 4095) == 4095
+    assert end_near_full(values, 4095, np.zeros_like(values)) == 4095
