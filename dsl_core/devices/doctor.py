@@ -22,7 +22,7 @@ from dsl_core.devices.driver_table import (
     open_device,
     read_settings,
 )
-from dsl_core.devices.plausible import require_frame, require_spectrum
+from dsl_core.devices.plausible import require_frame, require_spectrum, require_whole
 from dsl_core.devices.profile import DevicePart, RigProfile
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.model.frames import Frame
@@ -250,6 +250,7 @@ def _frames(camera: Camera) -> list[Frame]:
         camera.prepare(shot)
         frames.append(camera.snap(actual_ms + 3000.0))
         require_frame(frames[-1], camera.info, actual_ms)
+        require_whole(frames[-1].pixels, f"The camera {camera.info.model}")
     ids = [frame.frame_id for frame in frames]
     if ids != sorted(set(ids)):
         raise DeviceError(f"The camera numbers its frames {ids}, which must rise. Update its driver.")

@@ -27,7 +27,7 @@ from dsl_core.devices.base import (
     Stage,
 )
 from dsl_core.devices.device_thread import DeviceThread, DriverError, HangingError
-from dsl_core.devices.plausible import require_frame, require_position, require_spectrum
+from dsl_core.devices.plausible import require_frame, require_position, require_spectrum, require_whole
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.model.base import problems_in_words
 from dsl_core.model.frames import Frame
@@ -202,6 +202,8 @@ class _Camera(_Guard, Camera):
         self._exposure_ms: float | None = None
         #: Whether a first row, which is never cut off, had a pixel without any count: no black level.
         self._had_zero = False
+        #: Which rows had counts in all their pixels at some time, and which had none in the last picture.
+        self._filled, self._empty = np.zeros((2, self._info.height_px), bool)
 
     @property
     def info(self) -> CameraInfo:
@@ -228,10 +230,23 @@ class _Camera(_Guard, Camera):
             "take a picture", lambda: (camera.snap(timeout_ms), camera.info), timeout_ms / 1000.0
         )
         _require_same(self._name, self._info, info)
-        require_frame(frame, info, self._exposure_ms, self._had_zero)
-        self._had_zero |= not frame.pixels[0].all()
+        require_frame(frame, info, self._exposure_ms)
+        self._require_whole(frame.pixels)
         # A driver may fill the same memory again with its next picture.
         return replace(frame, pixels=frame.pixels.copy(), frame_id=int(frame.frame_id))
+
+    def _require_whole(self, pixels: NDArray[np.uint16]) -> None:
+        """Raise `DeviceError` for rows that are missing: not for dark ones of a camera without black level.
+
+        Rows that are dark again, and never were anything else, are where no light comes from.
+        """
+        empty = pixels.max(axis=1) == 0
+        is_dark = np.array_equal(empty, self._empty) and not (empty & self._filled).any()
+        self._empty = empty
+        self._filled |= pixels.min(axis=1) > 0
+        if not (self._had_zero or is_dark):
+            require_whole(pixels, self._name)
+        self._had_zero |= not pixels[0].all()
 
     def _ask(self, verb: str, action: Callable[[], T], more_s: float = 0.0) -> T:
         return self._line.ask(self._name, verb, action, self._patience.answer_s + more_s)

@@ -29,13 +29,10 @@ NEGATIVE_SHARE = 0.1
 RADIANCE = "W/(sr m2 nm)"
 
 
-def require_frame(
-    frame: object, camera: CameraInfo, exposure_ms: float | None, may_be_zero: bool = False
-) -> None:
+def require_frame(frame: object, camera: CameraInfo, exposure_ms: float | None) -> None:
     """Raise `DeviceError` unless a frame is what ``camera`` promises, exposed for ``exposure_ms``.
 
-    None stands for an exposure that nobody has set yet. Where pixels without light ``may_be_zero``, rows of
-    nothing else are dark; else they are missing.
+    None stands for an exposure that nobody has set yet.
     """
     name = f"The camera {camera.model}"
     if not isinstance(frame, Frame) or not isinstance(frame.pixels, np.ndarray):
@@ -56,15 +53,13 @@ def require_frame(
             f"{name} delivered a value of {brightest}; with {camera.bit_depth} bits, {most} is the largest."
             " Check its pixel format: values belong in the lower bits."
         )
-    if not may_be_zero:
-        _require_whole(frame.pixels, name)
     if not (math.isfinite(frame.exposure_ms) and frame.exposure_ms > 0):
         raise DeviceError(f"{name} says that it exposed for {frame.exposure_ms:g} ms. Update its driver.")
     if exposure_ms is not None:
         require_exposure(frame.exposure_ms, exposure_ms, name)
 
 
-def _require_whole(pixels: NDArray[np.uint16], name: str) -> None:
+def require_whole(pixels: NDArray[np.uint16], name: str) -> None:
     """Raise `DeviceError` for rows without any count where all others have a black level: a cut transfer."""
     empty = pixels.max(axis=1) == 0
     if empty.any() and not empty.all() and pixels[~empty].min() > 0:

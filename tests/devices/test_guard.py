@@ -288,6 +288,25 @@ def test_rows_without_any_count_are_dark_where_a_black_picture_had_none_either(
         np.testing.assert_array_equal(rig.camera.snap().pixels, pixels)
 
 
+def test_rows_that_are_empty_again_are_dark_unless_they_had_counts(lab: _Lab, rig: DeviceRig) -> None:
+    rig.camera.configure(10.0)
+    whole = np.full((4, 6), 9, np.uint16)
+    void, cut = whole.copy(), whole.copy()
+    void[3], cut[2:] = 0, 0
+
+    def snap(pixels: NDArray[np.uint16]) -> None:
+        lab.act["snap"] = partial(replace, FRAME, pixels=pixels)
+        rig.camera.snap()
+
+    with pytest.raises(DeviceError, match="1 of 4 rows empty"):
+        snap(void)
+    snap(void)
+    snap(void + (void > 0))
+    for _ in range(3):
+        with pytest.raises(DeviceError, match="2 of 4 rows empty"):
+            snap(cut)
+
+
 def test_a_driver_may_fill_the_same_memory_again(lab: _Lab, rig: DeviceRig) -> None:
     buffer = np.zeros((4, 6), np.uint16)
     lab.act["snap"] = lambda: replace(FRAME, pixels=buffer)
