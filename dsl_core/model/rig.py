@@ -32,14 +32,19 @@ def _rising(given: tuple[float, float]) -> tuple[float, float]:
     return given
 
 
-def _of_light(curve: SpectralCurve) -> SpectralCurve:
-    """The curve itself; raises ``ValueError`` if it covers no light, or is negative beyond noise."""
+def _in_light(curve: SpectralCurve) -> SpectralCurve:
+    """The curve itself; raises ``ValueError`` if it covers no light."""
     first, last = curve.wavelengths_nm[0], curve.wavelengths_nm[-1]
     if first > LIGHT_NM[1] or last < LIGHT_NM[0]:
         raise ValueError(
             f"this curve must have wavelengths of light in nm, between {LIGHT_NM[0]:g} and {LIGHT_NM[1]:g},"
             f" given {first:g} to {last:g}"
         )
+    return curve
+
+
+def _of_light(curve: SpectralCurve) -> SpectralCurve:
+    """The curve itself; raises ``ValueError`` if it is negative beyond noise."""
     if min(curve.values) < -NOISE_SHARE * max(0.0, *curve.values):
         raise ValueError(f"values of this curve must not be negative, given {min(curve.values):g}")
     return curve
@@ -53,11 +58,16 @@ def _some_light(curve: SpectralCurve) -> SpectralCurve:
     return curve
 
 
-def _has_first_order(efficiency: dict[int, SpectralCurve]) -> dict[int, SpectralCurve]:
-    if not any(order in efficiency and max(efficiency[order].values) > 0 for order in (1, -1)):
+def _with_first_order(efficiency: dict[int, SpectralCurve]) -> dict[int, SpectralCurve]:
+    """The same; raises ``ValueError`` without a first order, or if one is negative beyond their noise."""
+    most = max((max(efficiency[order].values) for order in (1, -1) if order in efficiency), default=0.0)
+    if most <= 0:
         raise ValueError(
             "order 1 or -1 must be there with an efficiency above zero: spectra are made of them"
         )
+    for order, curve in efficiency.items():
+        if min(curve.values) < -NOISE_SHARE * most:
+            raise ValueError(f"order {order} must not be negative, given {min(curve.values):g}")
     return efficiency
 
 
@@ -73,7 +83,8 @@ def _apart(pose: Pose) -> Pose:
 
 Range = Annotated[tuple[float, float], AfterValidator(_rising)]
 Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
-_Curve = Annotated[SpectralCurve, AfterValidator(_of_light)]
+_InLight = Annotated[SpectralCurve, AfterValidator(_in_light)]
+_Curve = Annotated[_InLight, AfterValidator(_of_light)]
 _Colour = Annotated[_Curve, AfterValidator(_some_light)]
 _Colours = tuple[_Colour, _Colour, _Colour]
 #: Share of the depth range at which a single flat target is, with room before and behind it.
@@ -337,7 +348,7 @@ class Rig(Record):
     film: Film
     response: _Colours
     emission: _Colours
-    efficiency: Annotated[dict[int, _Curve], AfterValidator(_has_first_order)]
+    efficiency: Annotated[dict[int, _InLight], AfterValidator(_with_first_order)]
     sensor: Sensor = Sensor()
     projector_response: ProjectorResponse = ProjectorResponse()
     white_scale: float = Field(gt=0)

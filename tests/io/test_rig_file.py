@@ -62,7 +62,8 @@ def _edited(tmp_path: Path, *steps: str | int, value: object) -> Path:
         (("response", 0, "std"), [0.1, -0.1, 0.1], r"response\.0: .*deviation must not be negative"),
         (("efficiency",), {}, "efficiency: order 1 or -1 must be there"),
         (("efficiency",), {"2": CURVE}, "efficiency: order 1 or -1 must be there"),
-        (("efficiency", "-1"), {**CURVE, "values": [-1.0]}, r"efficiency\.-1: .*not be negative"),
+        (("efficiency", "-1"), {**CURVE, "values": [-1.0]}, "efficiency: order -1 must not be negative"),
+        (("efficiency", "2"), {**CURVE, "values": [-0.05]}, "efficiency: order 2 must not be negative"),
         (("chain_rel_std",), {**CURVE, "values": [-0.1]}, "chain_rel_std: .*not be negative"),
         (("sensor", "black_level_dn"), 9000.0, "sensor: black_level_dn, 9000 DN, must be below .* 4095 DN"),
         (("depth_range_mm",), [1000.0, 500.0], "depth_range_mm: a range must rise, given 1000 to 500"),
@@ -74,6 +75,12 @@ def test_errors_name_the_field(
 ) -> None:
     with pytest.raises(CalibrationError, match=says):
         load_rig(_edited(tmp_path, *steps, value=value))
+
+
+def test_an_order_without_light_is_noise_around_zero(tmp_path: Path) -> None:
+    noise = {"wavelengths_nm": [430.0, 545.0, 660.0], "values": [-1e-4, 5e-5, 8e-5]}
+    found = load_rig(_edited(tmp_path, "efficiency", "-2", value=noise))
+    assert found.efficiency[-2].values == (-1e-4, 5e-5, 8e-5)
 
 
 def test_many_problems_are_told_at_once_but_not_all(tmp_path: Path) -> None:
