@@ -31,9 +31,9 @@ NEAR = 2
 #: to agree, or several to differ by so many deviations of columns elsewhere, which are so far from them.
 MOST_SKIPPED, FEWEST_EDGES, SIGMAS = 0.2, 20.0, 4.0
 #: Where this share of neighbouring pixels is the same number of columns apart, two or more, all edges agree
-#: anyway: only deviations count then. So it is where this share of pixels so many apart is 4, 8, 12...
+#: anyway: only deviations count then. So it is where this share of pixels so many apart is 16, 32, 48...
 #: columns apart, as edges are: at pixels 4/3 of a column wide, each is at the same place between them.
-REGULAR, REPEATED, APART = 0.9, 0.95, (3, 5, 7)
+REGULAR, REPEATED, APART = 0.9, 0.95, (12, 20, 28)
 #: Columns elsewhere: those in one row are alike if pixels are 2, 4 or 8 columns apart.
 ELSEWHERE = np.array([[side * away for away in range(6 + k, 30, 4) for side in (-1, 1)] for k in range(4)])
 #: Pixels side by side whose columns are further apart are on different surfaces.
@@ -93,8 +93,8 @@ def _is_regular(column: NDArray[np.integer]) -> bool:
     next_ones = _steps(column, 1)
     if next_ones[2:].max() > REGULAR * next_ones.sum():
         return True
-    alike = ((_steps(column, apart), apart // 4 * 4 + 4) for apart in APART)
-    return any(times[more::4].max() > REPEATED * times.sum() for times, more in alike)
+    alike = ((_steps(column, apart), apart // 16 * 16 + 16) for apart in APART)
+    return any(times[more::16].max() > REPEATED * times.sum() for times, more in alike)
 
 
 def _steps(column: NDArray[np.integer], apart: int) -> NDArray[np.int64]:
