@@ -19,7 +19,6 @@ from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
 from dsl_core.model.presets import PUBLISHED_PERIOD_MS, on_cycles
 from dsl_core.model.rig import Rig
-from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
@@ -35,8 +34,6 @@ PLACEMENT = Placement(target="spectralon", film=True)
 LINE_STEP_PX = 40
 #: Pixels whose light is compared, chosen at random.
 PIXELS = 4000
-#: Certified reflectance of a fresh Spectralon, for rigs that do not know that of their white.
-SPECTRALON = SpectralCurve(wavelengths_nm=(400.0, 700.0), values=(0.99, 0.99))
 #: Share of the pixels that white must not saturate: of fewer the plane and its light are not known.
 LEAST_SOUND = 0.5
 #: The user cannot lower the exposures of the quick shot.
@@ -110,6 +107,7 @@ def drift_figures(
 ) -> tuple[Figure, ...]:
     """The figures of a quick shot, the light compared at that many pixels; see `measure_drift`."""
     from dsl_core.calibration.common.plane import fit_plane
+    from dsl_core.calibration.common.white import SPECTRALON, white_target
     from dsl_core.calibration.drift.geometry import geometry_drift
     from dsl_core.calibration.drift.light import film_drift, light_drift
     from dsl_core.patterns.images import spectral_profiles
@@ -127,13 +125,13 @@ def drift_figures(
     figures = geometry_drift(rig, column, row, depth_mm, fit)
     stack, profiles = stack_lines(merged, progress), spectral_profiles(plan)[:, :, 0].astype(float)
     lines = _signals(rig, fit, chosen, profiles, stack.radiance, stack.std)
-    white_reflectance = (rig.white_reflectance if spectralon else None) or SPECTRALON
-    figures += film_drift(rig, lines, white_reflectance)
+    reflectance = white_target(rig, None if spectralon else SPECTRALON)
+    figures += film_drift(rig, lines, reflectance)
     if spectralon:
         std = np.where(white.saturated, np.inf, np.sqrt(white.variance))
         full = np.ones((1, profiles.shape[1]))
         seen = _signals(rig, fit, chosen, full, white.radiance[None], std[None])
-        figures += light_drift(rig, seen, white_reflectance)
+        figures += light_drift(rig, seen, reflectance)
     return tuple(figures)
 
 

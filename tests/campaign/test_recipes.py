@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from dsl_core.campaign.bandpass.recipe import BandpassRecipe
+from dsl_core.campaign.depth_stage.recipe import DepthStageRecipe
 from dsl_core.campaign.recipes import _build, _value, load_recipe, recipe_names
 from dsl_core.campaign.spectralon.recipe import SpectralonRecipe
 from dsl_core.errors import CalibrationError
@@ -62,6 +64,14 @@ def test_settings_at_their_bounds_are_taken() -> None:
     assert load_recipe("geometry", {"ratio": "1", "poses": "99"})
     assert load_recipe("spectralon", {"reflectance": "1.05", "depth_mm": "655"})
     assert load_recipe("depth-stage", {"positions_mm": "-3,0,5", "filters_nm": "450"})
+
+
+@pytest.mark.parametrize("name", ["bandpass", "depth-stage"])
+def test_the_target_is_the_spectralon_unless_another_one_is_stated(name: str) -> None:
+    recipe, other = load_recipe(name), load_recipe(name, {"reflectance": "0.85"})
+    assert isinstance(recipe, BandpassRecipe | DepthStageRecipe)
+    assert isinstance(other, BandpassRecipe | DepthStageRecipe)
+    assert (recipe.reflectance, other.reflectance) == (None, 0.85)
 
 
 def test_settings_are_read_from_text() -> None:

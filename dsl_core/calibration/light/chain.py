@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
+from dsl_core.calibration.common.white import white_target
 from dsl_core.calibration.light.chain_deviation import LeftOut, Part
 from dsl_core.calibration.light.chain_equations import (
     ZERO_ORDER_ERROR,
@@ -85,14 +86,14 @@ class _Solved:
 
 
 def chain_correction(
-    rig: Rig, scans: Sequence[LineScan], *, reflectance: float | SpectralCurve = 0.99
+    rig: Rig, scans: Sequence[LineScan], *, reflectance: float | None = None
 ) -> ChainCorrection:
-    """Smooth factors from one or more scans of a diffuser; raises `CalibrationError` without good pixels."""
+    """Smooth factors from one or more scans of a diffuser; raises `CalibrationError` without good pixels.
+
+    ``reflectance`` (share) is that of the diffuser, of the rig's white if not given.
+    """
     # Where the light goes depends on film and lenses alone, so that the model outlives the rig's curves.
-    model = correspondence(rig)
-    target = (
-        reflectance if isinstance(reflectance, SpectralCurve) else SpectralCurve.of([550.0], [reflectance])
-    )
+    model, target = correspondence(rig), white_target(rig, reflectance)
     factors, corrected = np.ones(UNKNOWNS.count), rig
     scale = 0.0, 0.0
     for round_ in range(ROUNDS):

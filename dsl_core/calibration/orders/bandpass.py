@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.common.white import white_target
 from dsl_core.calibration.light.chain_equations import LineScan, colours_of
 from dsl_core.calibration.light.zero_order import ZeroOrderFit, fit_zero_order
 from dsl_core.calibration.orders.efficiency import (
@@ -105,12 +106,17 @@ def plane_pixels(rig: Rig, scan: LineScan, filter_nm: float) -> PlanePixels:
 
 
 def fit_bandpass(
-    rig: Rig, scan: LineScan, profile: ZeroOrderFit, filters: Sequence[SeenFilter], reflectance: float = 0.99
+    rig: Rig,
+    scan: LineScan,
+    profile: ZeroOrderFit,
+    filters: Sequence[SeenFilter],
+    reflectance: float | None = None,
 ) -> BandpassCalibration:
     """All that filters say of a rig whose response and emission are known about.
 
-    ``scan`` is the target without filter. Raises `CalibrationError` that names a filter which is not the one
-    requested, and where too few filters show an order.
+    ``scan`` is the target without filter; ``reflectance`` (share) is that of the target, of the rig's white
+    if not given. Raises `CalibrationError` that names a filter which is not the one requested, and where too
+    few filters show an order.
     """
     if not filters:
         raise CalibrationError("No filter was captured. Capture at least two of different wavelengths.")
@@ -133,13 +139,14 @@ def fit_bandpass(
     fits = {order: fit_efficiency(order, samples[order]) for order in ORDERS}
     share, share_std = second_order_share(_second(filters, lights, fits))
     white, white_std = _white(rig, profile_scan(scan), profile)
+    target = white_target(rig, reflectance).at(FINE_NM)
     bands = [
-        BandSample(each.light.zero, each.light.zero_std, light * reflectance, each.measured_curve)
+        BandSample(each.light.zero, each.light.zero_std, light * target, each.measured_curve)
         for each, light in zip(filters, lights, strict=True)
     ]
-    refined = fit_response(rig, bands, white, white_std, reflectance)
+    refined = fit_response(rig, bands, white, white_std, target)
     through = [through_filter(each.transmission, shift) for each in filters]
-    off_nm, off_std_nm = shift_of_all(rig, bands, through, white, white_std, reflectance)
+    off_nm, off_std_nm = shift_of_all(rig, bands, through, white, white_std, target)
     efficiency = {order: fit.curve for order, fit in fits.items()}
     if np.isfinite(share_std):
         for order in ORDERS:

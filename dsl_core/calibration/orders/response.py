@@ -59,12 +59,12 @@ class BandSample:
 
 
 def fit_response(
-    rig: Rig, samples: Sequence[BandSample], white: Floats, white_std: Floats, reflectance: float
+    rig: Rig, samples: Sequence[BandSample], white: Floats, white_std: Floats, reflectance: Floats
 ) -> Rig:
     """The rig with its response and white scale refined, and their deviations.
 
     ``white`` (3,) is the zero order of white at unit shading, DN per ms, NaN for colours that the camera does
-    not have: their curves stay as they are.
+    not have: their curves stay as they are; ``reflectance`` is the target's at `FINE_NM`, as a share.
     """
     in_white = chain_response(rig, 0, FINE_NM).sum(1) * reflectance
     change = np.zeros((3, len(NODES_NM)))
@@ -80,7 +80,7 @@ def shift_of_all(
     through: Sequence[Floats],
     white: Floats,
     white_std: Floats,
-    reflectance: float,
+    reflectance: Floats,
 ) -> tuple[float, float]:
     """By how many nm all filters pass longer wavelengths than stated, against the LEDs' spectra; deviation.
 

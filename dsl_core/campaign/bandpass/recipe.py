@@ -73,8 +73,9 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     ``filters_nm`` are the nominal centres of the filters; ``line_px`` is the width and step of the lines
     through a filter, which must tile the frame; ``long_ratio`` above 1 adds a second, longer exposure, for
     noisy cameras; ``pixels`` is how many camera pixels are used; ``depth_mm`` is the distance of the target,
-    by default two fifths into the rig's depth range; ``reflectance`` is the reflectance of the target;
-    ``fwhm_nm`` is the width at half of their peak of filters whose transmission is not measured.
+    by default two fifths into the rig's depth range; ``reflectance`` is that of the target, by default that
+    of the Spectralon; ``fwhm_nm`` is the width at half of their peak of filters whose transmission is not
+    measured.
     """
 
     name = "bandpass"
@@ -88,7 +89,7 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
     long_ratio: Ratio = 1.0
     pixels: Count = 20_000
     depth_mm: Positive | None = None
-    reflectance: Reflectance = 0.99
+    reflectance: Reflectance | None = None
     fwhm_nm: Positive = FWHM_NM
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:

@@ -95,9 +95,10 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
     range, as far as its stage reaches. ``stage_std_mm`` is the standard deviation of the stage's positions;
     ``filters_nm`` are the nominal centres of the bandpass filters. ``code_step_px`` is the step of the lines
     without filter, at most 5; ``filter_step_px`` is the step of the lines through filters, which may be far
-    apart. ``reflectance`` is the reflectance of the target; ``chain`` lets the plane correct the product of
-    response, emission and efficiency; ``grid`` adds a model of the columns derived from the data, which needs
-    three positions. ``fwhm_nm`` is the width at half of their peak of filters without measured transmission.
+    apart. ``reflectance`` is that of the target, by default that of the Spectralon; ``chain`` lets the
+    plane correct the product of response, emission and efficiency; ``grid`` adds a model of the columns
+    derived from the data, which needs three positions. ``fwhm_nm`` is the width at half of their peak of
+    filters without measured transmission.
     """
 
     name = "depth-stage"
@@ -111,7 +112,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
     code_step_px: Count = 4
     filter_step_px: Count = 16
     stage_std_mm: Positive = 0.02
-    reflectance: Reflectance = 0.99
+    reflectance: Reflectance | None = None
     chain: bool = True
     grid: bool = False
     fwhm_nm: float = FWHM_NM
@@ -333,8 +334,9 @@ def _plain_step(position_mm: float) -> Step:
     return Step(
         f"position-{position_mm:g}",
         f"Plane at {position_mm:g} mm",
-        "Mount the film in front of the projector and put the flat white target on the stage at"
-        f" {position_mm:g} mm, facing the camera and filling its view. No filter in front of the camera.",
+        "Mount the film in front of the projector and put the Spectralon, or a flat white target whose"
+        f" reflectance is set, on the stage at {position_mm:g} mm, facing the camera and filling its view. No"
+        " filter in front of the camera.",
         Placement(target="spectralon", film=True, options={"depth_mm": position_mm}),
     )
 

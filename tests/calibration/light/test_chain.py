@@ -279,3 +279,13 @@ def test_the_chain_is_no_surer_than_its_model_whatever_frames_and_places_say(
 
     assert std(0.0, 0.0, 0.0) == pytest.approx([MODEL_STD] * 2)
     assert std(1e-4, 2e-4, 1e-4) == pytest.approx([np.hypot(0.02, MODEL_STD)] * 2)
+
+
+def test_the_diffuser_is_the_white_that_the_light_refers_to_unless_another_one_is_stated(
+    corrected: tuple[Rig, Rig, ChainCorrection], lines: LineScan
+) -> None:
+    _, before, usual = corrected
+    grey = before.model_copy(update={"white_reflectance": SpectralCurve.of([400.0, 700.0], [0.9, 0.9])})
+    known = chain_correction(grey, [lines])
+    assert known == chain_correction(before, [lines], reflectance=0.9)
+    assert known.white_scale_factor > 1.05 * usual.white_scale_factor

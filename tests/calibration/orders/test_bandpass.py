@@ -29,6 +29,7 @@ from dsl_core.calibration.orders.steady_light import LightJump
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
 from dsl_core.model.plan import ScanLines
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.filters import FINE_NM, nominal_filter, passed, relative_shift
 from dsl_core.optics.sensor import bayer_channels
@@ -292,3 +293,20 @@ def test_filters_that_are_all_off_alike_are_told(record: BandpassCalibration) ->
     assert found.filters_off_nm == pytest.approx(-6.0, abs=0.4)
     assert record.filters_off_nm == pytest.approx(0.0, abs=0.3)
     assert record.filter_index is None
+
+
+def test_the_target_is_the_white_that_the_light_refers_to_unless_another_one_is_stated(
+    record: BandpassCalibration,
+) -> None:
+    scan, profile = without_filter()
+    filters = [seen(nm) for nm in CENTRES]
+    yellowed = SpectralCurve.of([430.0, 660.0], [0.78, 0.88])
+    known = RIG.model_copy(update={"white_reflectance": yellowed})
+    assert fit_bandpass(known, scan, profile, filters, REFLECTANCE) == record
+    found = fit_bandpass(known, scan, profile, filters)
+    # What the curve takes from white, response and white scale have to give back, at each wavelength.
+    for truth, response in zip(RIG.response, found.response, strict=True):
+        bright = truth.at(FINE_NM) > 0.3 * max(truth.values)
+        given = found.white_scale * response.at(FINE_NM) * yellowed.at(FINE_NM)
+        expected = REFLECTANCE * RIG.white_scale * truth.at(FINE_NM)
+        assert given[bright] == pytest.approx(expected[bright], rel=0.02)

@@ -49,7 +49,7 @@ def fitted(measured: bool, factor: float = 1.0) -> Rig:
         seen = factor * passed(truth, nominal_filter(nm)).sum(1) * (1 + 1e-3 * rng.standard_normal(3))
         samples.append(BandSample(seen, 1e-3 * seen, passed(known, nominal_filter(nm)), measured))
     white = chain_response(truth, 0, FINE_NM).sum((1, 2))
-    return fit_response(known, samples, white, 1e-3 * white, 1.0)
+    return fit_response(known, samples, white, 1e-3 * white, np.ones(len(FINE_NM)))
 
 
 @pytest.mark.parametrize(("measured", "factor"), [(True, 1.0), (False, 0.8)])
@@ -76,7 +76,7 @@ def test_filters_that_are_all_off_alike_disagree_with_the_leds(off_nm: float, ce
         samples.append(BandSample(seen, 1e-3 * seen, passed(known, nominal_filter(nm)), True))
         through.append(through_filter(nominal_filter(nm)))
     white = chain_response(truth, 0, FINE_NM).sum((1, 2))
-    found, std = shift_of_all(known, samples, through, white, 1e-3 * white, 1.0)
+    found, std = shift_of_all(known, samples, through, white, 1e-3 * white, np.ones(len(FINE_NM)))
     assert abs(found - off_nm) < 0.4
     assert 0.5 / np.sqrt(len(samples)) <= std < 0.4
 
@@ -95,7 +95,7 @@ def test_edges_of_a_response_that_look_like_a_shift_are_in_its_deviation(off_nm:
     ]
     white = chain_response(truth, 0, FINE_NM).sum((1, 2))
     through = [through_filter(nominal_filter(each)) for each in CENTRES]
-    found, std = shift_of_all(known, samples, through, white, 1e-3 * white, 1.0)
+    found, std = shift_of_all(known, samples, through, white, 1e-3 * white, np.ones(len(FINE_NM)))
     assert abs(found - off_nm) < 2 * std
 
 
@@ -108,7 +108,7 @@ def test_nominal_curves_say_less_of_a_shift_than_measured_ones() -> None:
         samples = [BandSample(x.sum(1), 1e-3 * x.sum(1), x, measured) for x in lights]
         white = chain_response(known, 0, FINE_NM).sum((1, 2))
         through = [through_filter(nominal_filter(nm)) for nm in CENTRES]
-        found.append(shift_of_all(known, samples, through, white, 1e-3 * white, 1.0))
+        found.append(shift_of_all(known, samples, through, white, 1e-3 * white, np.ones(len(FINE_NM))))
     assert [abs(value) < 1e-6 for value, _ in found] == [True, True]
     assert found[1][1] > 2 * found[0][1]
     assert found[1][1] >= 1.5 / np.sqrt(len(CENTRES))
@@ -201,7 +201,7 @@ def test_everything_unknown_has_its_place_and_its_deviation_beforehand(
     rig, light = published_rig(), passed(published_rig(), nominal_filter(540.0))
     white = 1.1 * chain_response(rig, 0, FINE_NM).sum((1, 2))
     filters = [BandSample(1.2 * light.sum(1), 0.01 * light.sum(1), light, known) for known in (True, False)]
-    fit_response(rig, filters, white, 0.02 * white, 1.0)
+    fit_response(rig, filters, white, 0.02 * white, np.ones(len(FINE_NM)))
     equations, functions, others, choices = asked[0]
     assert len(asked) == 3
     assert others == [0.005, 0.15, 0.01, 0.3]
