@@ -206,8 +206,25 @@ def test_grey_standards_may_be_as_dark_as_they_are_sold() -> None:
     for share in (0.02, 0.05, 0.99):
         assert SpectralonRecipe(reflectance=share)._reflectance().at(550.0) == share
     for share in (0.0, 0.019, 1.06, 5.0):
-        with pytest.raises(CalibrationError, match=rf"cannot be {share:g}; give a share of 0\.02 or more"):
+        with pytest.raises(CalibrationError, match=rf"cannot be {share:g}; give a share of 0\.02 to 1\.05"):
             SpectralonRecipe(reflectance=share)._reflectance()
+
+
+@pytest.mark.parametrize(("nm", "share"), [(400, 1.8), (400, -0.3), (550, 0.0), (700, 0.019)])
+def test_a_file_of_reflectance_has_the_bounds_of_a_number(nm: int, share: float, tmp_path: Path) -> None:
+    file, shares = tmp_path / "white.csv", dict.fromkeys(range(400, 701, 10), 0.02) | {500: 1.05}
+    recipe = SpectralonRecipe(reflectance_file=str(file))
+    write_shares(file, shares)
+    assert recipe._reflectance().values == tuple(shares.values())
+    write_shares(file, shares | {nm: share})
+    with pytest.raises(
+        CalibrationError, match=rf"cannot be {share:g} at {nm} nm \(white\.csv\); give a share"
+    ):
+        recipe._reflectance()
+
+
+def write_shares(file: Path, shares: dict[int, float]) -> None:
+    file.write_text("\n".join(f"{nm},{share}" for nm, share in shares.items()), encoding="utf-8")
 
 
 def test_an_impossible_reflectance_and_chart_are_told(module_folder: Path) -> None:

@@ -163,11 +163,14 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
                 f" {self.reflectance_rel_std:g}; give a share such as 0.0025, half of what its certificate"
                 " states for 95 %."
             )
+        curve = SpectralCurve.of([400.0, 700.0], [self.reflectance] * 2)
         if self.reflectance_file:
-            return read_spectrum(Path(self.reflectance_file), radiance=False)
-        if not LEAST_REFLECTANCE <= self.reflectance <= MOST_REFLECTANCE:
-            raise CalibrationError(
-                f"The reflectance of the Spectralon cannot be {self.reflectance:g}; give a share of"
-                f" {LEAST_REFLECTANCE:g} or more, such as 0.99, from its certificate."
-            )
-        return SpectralCurve.of([400.0, 700.0], [self.reflectance] * 2)
+            curve = read_spectrum(Path(self.reflectance_file), radiance=False)
+        for nm, share in zip(curve.wavelengths_nm, curve.values, strict=True):
+            if not LEAST_REFLECTANCE <= share <= MOST_REFLECTANCE:
+                where = f" at {nm:g} nm ({Path(self.reflectance_file).name})" if self.reflectance_file else ""
+                raise CalibrationError(
+                    f"The reflectance of the Spectralon cannot be {share:g}{where}; give a share of"
+                    f" {LEAST_REFLECTANCE:g} to {MOST_REFLECTANCE:g}, such as 0.99, from its certificate."
+                )
+        return curve
