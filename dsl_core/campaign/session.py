@@ -208,14 +208,16 @@ class CalibrationSession:
     def accepted(self) -> AcceptedCalibration | None:
         """The accepted calibration while it is good.
 
-        It was fitted on those before it, with these settings, and from the captures that are there now.
+        It was fitted on those before it, with these settings and the files that they name, and from the
+        captures that are there now.
         """
         found = self.campaign.accepted(self.recipe.name)
         if found is None or found.based_on != self.based_on or found.captured != self._captured():
             return None
         # What the session adds to the recipe's settings follows from captures, which are looked at elsewhere.
         own = {name: text for name, text in found.settings.items() if name not in ADDED_SETTINGS}
-        return found if own == self.campaign.info.settings.get(self.recipe.name, {}) else None
+        same = own == self.campaign.info.settings.get(self.recipe.name, {})
+        return found if same and self.recipe.is_current(found.record) else None
 
     def _folder(self, step: Step) -> Path:
         return self.bench.step_folder(step)

@@ -333,6 +333,21 @@ def test_other_settings_are_fitted_again_from_the_same_captures(
     assert session(devices, other, recipe).accepted() == new
 
 
+def test_files_that_say_something_else_now_are_fitted_again(
+    devices: DeviceRig, campaign: CampaignFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recipe = FakeRecipe()
+    old = run_calibration(session(devices, campaign, recipe), Willing(), NoProgress())
+    captured, asked = list(recipe.captured), list[object]()
+    monkeypatch.setattr(FakeRecipe, "is_current", lambda _, record: asked.append(record))
+    assert session(devices, campaign, recipe).accepted() is None
+    assert asked == [old.record]
+    assert (
+        run_calibration(session(devices, campaign, recipe), Willing(), NoProgress()).accepted > old.accepted
+    )
+    assert recipe.captured == captured
+
+
 def test_nothing_is_calibrated_on_what_another_rig_was_captured_with(
     devices: DeviceRig, campaign: CampaignFolder
 ) -> None:

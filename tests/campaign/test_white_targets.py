@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -225,6 +226,22 @@ def test_a_file_of_reflectance_has_the_bounds_of_a_number(nm: int, share: float,
 
 def write_shares(file: Path, shares: dict[int, float]) -> None:
     file.write_text("\n".join(f"{nm},{share}" for nm, share in shares.items()), encoding="utf-8")
+
+
+def test_a_fit_is_current_while_its_file_of_reflectance_says_the_same(tmp_path: Path) -> None:
+    file = tmp_path / "white.csv"
+    recipe = SpectralonRecipe(reflectance_file=str(file))
+    write_shares(file, dict.fromkeys(range(400, 701, 10), 1 / 3))
+    record = json.loads(json.dumps({"reflectance": recipe._reflectance().model_dump(mode="json")}))
+    assert recipe.is_current(record)
+    # Corrected under its name, corrected wrongly, gone.
+    for share, current in ((0.8, False), (1.8, False), (None, True)):
+        if share is None:
+            file.unlink()
+        else:
+            write_shares(file, dict.fromkeys(range(400, 701, 10), share))
+        assert recipe.is_current(record) is current
+    assert SpectralonRecipe().is_current(record)
 
 
 def test_an_impossible_reflectance_and_chart_are_told(module_folder: Path) -> None:

@@ -7,7 +7,7 @@ in its folder, so that an interrupted calibration can continue where it stopped.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -151,6 +151,10 @@ class Recipe(ABC, Generic[RecordT]):
     @abstractmethod
     def fit(self, bench: Bench, progress: Progress) -> RecordT:
         """Calibrate from the captures of all steps; the devices are not used."""
+
+    def is_current(self, record: Mapping[str, Any]) -> bool:
+        """Whether files that settings name still say what the ``record`` of a fit, as JSON, was made from."""
+        return True
 
     @abstractmethod
     def figures(self, record: RecordT, done: Collection[str] = ()) -> tuple[Figure, ...]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from dsl_core.calibration.common.plane import bulge_mm
 from dsl_core.calibration.light.emission import measured_emission
@@ -28,7 +29,7 @@ from dsl_core.campaign.common.flat_target import capture_uniform, middle, read_u
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.white_shot import brightness, other_light, shoot_white
 from dsl_core.campaign.spectralon.emission_readings import is_read, load_readings, read_emission
-from dsl_core.errors import CalibrationError
+from dsl_core.errors import CalibrationError, DslError
 from dsl_core.io.spectra.spectrum_file import read_spectrum
 from dsl_core.model.calibration.spectralon import MeasuredEmission, SpectralonCalibration
 from dsl_core.model.figure import Figure
@@ -110,6 +111,15 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
             emission = measured_emission(load_readings(bench, spectra), reflectance)
         with naming(pictures):
             return self._pictures(bench, pictures, emission, reflectance, progress)
+
+    def is_current(self, record: Mapping[str, Any]) -> bool:
+        """Whether the file of reflectance says what it said at the fit; one that is gone says nothing."""
+        if not self.reflectance_file or not Path(self.reflectance_file).exists():
+            return True
+        try:
+            return bool(record.get("reflectance") == self._reflectance().model_dump(mode="json"))
+        except DslError:
+            return False  # a fit says why
 
     def figures(self, record: SpectralonCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """What was measured, against its limits."""
