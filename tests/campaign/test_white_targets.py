@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,10 +13,12 @@ import pytest
 
 from dsl_core.campaign.color_checker.recipe import ColorCheckerRecipe
 from dsl_core.campaign.common.recipe import Bench, Recipe, RecordT
+from dsl_core.campaign.session import CalibrationSession
 from dsl_core.campaign.spectralon.emission_readings import DRIVE
 from dsl_core.campaign.spectralon.recipe import SpectralonRecipe
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
+from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.calibration.color_checker import ColorCheckerCalibration
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 from dsl_core.model.figure import failures
@@ -179,17 +182,8 @@ def test_a_missing_chart_is_told(module_folder: Path) -> None:
 
 
 def test_spectra_may_come_from_files(tmp_path: Path) -> None:
-    devices = twin(1)
-    assert devices.place is not None
-    assert devices.spectroradiometer is not None
-    devices.place(Placement(target="spectralon", film=False))
-    info, spectra = devices.projector.info, tmp_path / "spectra"
-    spectra.mkdir()
-    for colour, drive in DRIVE.items():
-        devices.projector.show(np.full((info.height_px, info.width_px, 3), drive, np.uint8))
-        curve = devices.spectroradiometer.measure()
-        rows = [f"{nm:g};{1e3 * v:.8g}" for nm, v in zip(curve.wavelengths_nm, curve.values, strict=True)]
-        (spectra / f"{colour}.csv").write_text("\n".join(["nm;mW/(sr m2 nm)", *rows]), encoding="utf-8")
+    devices, spectra = twin(1), tmp_path / "spectra"
+    write_spectra(devices, spectra)
     alone = replace(devices, spectroradiometer=None)
     recipe = SpectralonRecipe(emission_folder=str(spectra))
     bench = Bench(alone, tmp_path / "spectralon", known(1, devices))
@@ -201,6 +195,57 @@ def test_spectra_may_come_from_files(tmp_path: Path) -> None:
     (spectra / "black.csv").unlink()
     with pytest.raises(CalibrationError, match="no spectrum of black"):
         recipe.capture(bench, first, NONE)
+
+
+def write_spectra(devices: DeviceRig, folder: Path, factor: float = 1.0) -> None:
+    """What the twin's instrument reads under each picture, times a factor, as files."""
+    assert devices.place is not None
+    assert devices.spectroradiometer is not None
+    devices.place(Placement(target="spectralon", film=False))
+    info = devices.projector.info
+    folder.mkdir(exist_ok=True)
+    for colour, drive in DRIVE.items():
+        devices.projector.show(np.full((info.height_px, info.width_px, 3), drive, np.uint8))
+        curve = devices.spectroradiometer.measure()
+        values = 1e3 * factor * np.array(curve.values)
+        rows = [f"{nm:g};{v:.8g}" for nm, v in zip(curve.wavelengths_nm, values, strict=True)]
+        (folder / f"{colour}.csv").write_text("\n".join(["nm;mW/(sr m2 nm)", *rows]), encoding="utf-8")
+
+
+def test_files_of_spectra_named_or_corrected_after_others_were_read_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(SpectralonRecipe, "needs", ())
+    devices, spectra = twin(1), tmp_path / "spectra"
+    write_spectra(devices, spectra)
+    campaign = CampaignFolder.begin(tmp_path / "campaign", "twin", {})
+
+    def session(folder: Path | None) -> CalibrationSession:
+        recipe = SpectralonRecipe(emission_folder=str(folder or ""))
+        return CalibrationSession(recipe, devices, campaign, (recipe,))
+
+    def state(folder: Path | None) -> str:
+        return session(folder).statuses()[0].state
+
+    first = session(None).steps[0]
+    session(None).capture(first)
+    assert (state(None), state(spectra)) == ("captured", "refused")
+    assert "are not those of the folder" in session(spectra).statuses()[0].reason
+    with pytest.raises(CalibrationError, match="does not exist"):
+        session(tmp_path / "misspelt").capture(first)
+    assert state(None) == "captured", "a name that is wrong cost what the instrument has read"
+    session(spectra).capture(first)
+    assert state(spectra) == "captured"
+    assert state(tmp_path / "other") == "refused"
+    write_spectra(devices, spectra, 1.1)
+    assert state(spectra) == "refused"
+    session(spectra).capture(first)
+    assert state(spectra) == "captured"
+    (spectra / "black.csv").unlink()
+    assert state(spectra) == "refused"
+    # Files that were moved away later are still those that were read.
+    shutil.rmtree(spectra)
+    assert state(spectra) == "captured"
 
 
 def test_grey_standards_may_be_as_dark_as_they_are_sold() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.plausible import require_grid, require_light
-from dsl_core.errors import CalibrationError
+from dsl_core.errors import CalibrationError, DslError, StoreError
 from dsl_core.io.spectra.catalogue import suffixes
 from dsl_core.io.spectra.spectrum_file import read_radiances
 from dsl_core.model.calibration.spectralon import COLOURS, EmissionReadings, LightColour
@@ -27,9 +27,23 @@ DRIVE: dict[LightColour, tuple[int, int, int]] = {
 }
 
 
-def is_read(bench: Bench, step: Step) -> bool:
-    """Whether the spectra of all pictures are stored."""
-    return _is_begun(bench, step) and set(load_readings(bench, step).readings) == set(COLOURS)
+def is_read(bench: Bench, step: Step, files: Path | None) -> bool:
+    """Whether the spectra of all pictures are stored.
+
+    Raises `StoreError` where they are not those of a folder of ``files``: it was named, or a file corrected,
+    after they were read.
+    """
+    if not _is_begun(bench, step):
+        return False
+    kept = load_readings(bench, step)
+    if set(kept.readings) != set(COLOURS):
+        return False
+    if files is not None and not _are_of(files, kept):
+        raise StoreError(
+            f"The spectra that were read are not those of the folder {files} (emission_folder). Capture the"
+            f" step {step.key} again to read these."
+        )
+    return True
 
 
 def load_readings(bench: Bench, step: Step) -> EmissionReadings:
@@ -44,7 +58,7 @@ def read_emission(bench: Bench, step: Step, count: int, files: Path | None, prog
     file that is missing or wrong.
     """
     if files is not None:
-        read = EmissionReadings(source=str(files.name), readings=_from_files(files))
+        read = EmissionReadings(source=files.name, readings=_from_files(files))
         bench.keep(step, READINGS_NAME, read)
         return
     devices = bench.devices
@@ -70,6 +84,16 @@ def read_emission(bench: Bench, step: Step, count: int, files: Path | None, prog
             read = EmissionReadings(source="spectroradiometer", readings=readings)
             bench.keep(step, READINGS_NAME, read)
     progress.report("spectra", len(COLOURS), len(COLOURS))
+
+
+def _are_of(files: Path, kept: EmissionReadings) -> bool:
+    """Whether spectra are those of a folder; one that is gone says nothing else than when it was read."""
+    if not files.is_dir():
+        return kept.source == files.name
+    try:
+        return _from_files(files) == kept.readings
+    except DslError:
+        return False  # reading them says why
 
 
 def _is_begun(bench: Bench, step: Step) -> bool:

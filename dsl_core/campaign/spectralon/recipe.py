@@ -92,14 +92,13 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
         )
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
-        """Whether all spectra are read, or the scan is complete."""
-        return is_read(bench, step) if step.key == EMISSION else bench.is_scanned(step)
+        """Whether all spectra are read, from the folder if one is named, or the scan is complete."""
+        return is_read(bench, step, self._files()) if step.key == EMISSION else bench.is_scanned(step)
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Read spectra, or choose exposures by a test shot and capture."""
         if step.key == EMISSION:
-            source = Path(self.emission_folder) if self.emission_folder else None
-            read_emission(bench, step, self.readings, source, progress)
+            read_emission(bench, step, self.readings, self._files(), progress)
         else:
             capture_uniform(bench, step, 1.0, progress)
 
@@ -164,6 +163,9 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
                 "bulge_mm": bulge_mm(bench.rig, target.depth_mm, found),
             }
         )
+
+    def _files(self) -> Path | None:
+        return Path(self.emission_folder) if self.emission_folder else None
 
     def _reflectance(self) -> SpectralCurve:
         """The certified reflectance over wavelength; raises `CalibrationError`."""
