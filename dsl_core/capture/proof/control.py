@@ -17,18 +17,20 @@ WELL_SEEN = 0.7
 UNCHANGED, MORE_NOISE = 0.03, 0.5
 #: A pixel is lit with a contrast of so many deviations.
 LIT_SIGMAS = 12.0
+#: On average it is so many, else two takes may differ by as much as other patterns do, from noise alone.
+CLEAR_SIGMAS = 20.0
 #: Edges of a pattern have moved from so many camera pixels and deviations on.
 MOVED_PX, MOVED_SIGMAS = 0.06, 4.0
 #: Pixels are near an edge if light changes there by this share of the contrast from pixel to pixel; so many
-#: have to be.
+#: have to be, or have to be lit.
 STEEP, FEWEST_NEAR = 0.15, 24
 
 
-def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int]) -> tuple[int, ...]:
+def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int], noise: Noise) -> tuple[int, ...]:
     """The pairs with the most and the fewest stripes of those well seen; ``shape`` is that of the raster.
 
     Stripes rather than white: they move when anything does. The widest are not their own mirror image, as all
-    others of a Gray code are.
+    others of a Gray code are. None where there is too little light to tell one pattern from another.
     """
     if not pairs:
         return ()
@@ -38,13 +40,20 @@ def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int]) -> tuple[int
     for number, (one, other) in pairs.items():
         step = one.astype(np.float32) - other.astype(np.float32)
         seen = np.abs(step) > WELL_SEEN * np.maximum(contrast, 1.0)
-        if (seen & lit).sum() < WELL_SEEN * lit.sum():
+        if (seen & lit).sum() < WELL_SEEN * lit.sum() or not _is_clear(one, contrast, noise):
             continue
         grid, known = (step > 0).reshape(shape), (seen & lit).reshape(shape)
         changes = int(((grid[:, 1:] != grid[:, :-1]) & known[:, 1:] & known[:, :-1]).sum())
         if changes:
             found[number] = changes
     return tuple(dict.fromkeys(ends(found, key=lambda n: found[n]) for ends in (max, min))) if found else ()
+
+
+def _is_clear(picture: Counts, contrast: Floats, noise: Noise) -> bool:
+    """Whether another take of a picture is the same by `is_same`, whatever noise does."""
+    sigma = np.sqrt(noise.variance(picture))
+    lit = contrast > LIT_SIGMAS * sigma
+    return int(lit.sum()) >= FEWEST_NEAR and float((sigma[lit] / contrast[lit]).mean()) < 1 / CLEAR_SIGMAS
 
 
 def is_same(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise) -> bool:

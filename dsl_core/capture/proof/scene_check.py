@@ -36,7 +36,7 @@ class SceneCheck:
     def controls(self) -> tuple[Shot, ...]:
         """Shots that show whether devices and scene are as they were; none before the first code."""
         known = self._known
-        numbers = choose_pairs(known.code_pairs(), known.raster.shape)
+        numbers = choose_pairs(known.code_pairs(), known.raster.shape, known.noise)
         return tuple(known.shots[known.places["code", 2 * number]] for number in numbers)
 
     def is_as_before(self, control: Shot, pixels: Mosaic) -> bool:

@@ -25,23 +25,23 @@ def stripes(width: int, contrast: np.ndarray | float = 100.0, share: float = 1.0
 
 def test_the_pairs_with_the_most_and_the_fewest_stripes_are_chosen() -> None:
     pairs = {0: stripes(16), 1: stripes(8), 2: stripes(4), 3: stripes(2), 4: stripes(1)}
-    assert choose_pairs(pairs, SHAPE) == (4, 1), "without a stripe nothing moves"
-    assert choose_pairs({0: stripes(16), 2: stripes(4)}, SHAPE) == (2,)
-    assert choose_pairs({0: stripes(16)}, SHAPE) == ()
-    assert choose_pairs({}, SHAPE) == ()
+    assert choose_pairs(pairs, SHAPE, NOISE) == (4, 1), "without a stripe nothing moves"
+    assert choose_pairs({0: stripes(16), 2: stripes(4)}, SHAPE, NOISE) == (2,)
+    assert choose_pairs({0: stripes(16)}, SHAPE, NOISE) == ()
+    assert choose_pairs({}, SHAPE, NOISE) == ()
 
 
 @pytest.mark.parametrize(("share", "chosen"), [(0.68, (2, 1)), (0.74, (4, 1))])
 def test_stripes_need_seven_tenths_of_the_contrast(share: float, chosen: tuple[int, ...]) -> None:
     pairs = {1: stripes(8), 2: stripes(4), 4: stripes(1, share=share)}
-    assert choose_pairs(pairs, SHAPE) == chosen
+    assert choose_pairs(pairs, SHAPE, NOISE) == chosen
 
 
 @pytest.mark.parametrize(("seen", "chosen"), [(11, (2, 1)), (12, (4, 1))])
 def test_stripes_are_seen_in_seven_tenths_of_the_lit_pixels(seen: int, chosen: tuple[int, ...]) -> None:
     part = np.where(np.arange(16) < seen, 1.0, 0.2)
     pairs = {1: stripes(8), 2: stripes(4), 4: stripes(1, 100.0 * part)}
-    assert choose_pairs(pairs, SHAPE) == chosen
+    assert choose_pairs(pairs, SHAPE, NOISE) == chosen
 
 
 @pytest.mark.parametrize(("contrast", "chosen"), [(40.0, (4, 1)), (60.0, (2, 1))])
@@ -51,14 +51,23 @@ def test_pixels_with_less_than_half_the_usual_contrast_do_not_count(
     light = np.where(np.arange(16) < 10, 100.0, contrast)
     part = np.where(np.arange(16) < 10, 1.0, 0.2)
     pairs = {1: stripes(8, light), 2: stripes(4, light), 4: stripes(1, light * part)}
-    assert choose_pairs(pairs, SHAPE) == chosen
+    assert choose_pairs(pairs, SHAPE, NOISE) == chosen
 
 
 def test_stripes_between_unseen_pixels_are_not_counted() -> None:
     # Of single stripes that every fourth pixel does not see, 7 of 15 changes are seen: as many as of two.
     gaps = np.where(np.arange(16) % 4 == 1, 0.2, 1.0)
-    assert choose_pairs({1: stripes(1, 100 * gaps), 2: stripes(2)}, SHAPE) == (1,)
-    assert choose_pairs({1: stripes(1), 2: stripes(2)}, SHAPE) == (1, 2)
+    assert choose_pairs({1: stripes(1, 100 * gaps), 2: stripes(2)}, SHAPE, NOISE) == (1,)
+    assert choose_pairs({1: stripes(1), 2: stripes(2)}, SHAPE, NOISE) == (1, 2)
+
+
+@pytest.mark.parametrize(("contrast", "chosen"), [(3.0, ()), (30.0, ()), (70.0, (2, 1))])
+def test_nothing_is_a_control_that_noise_alone_makes_another_pattern(
+    contrast: float, chosen: tuple[int, ...]
+) -> None:
+    """Noise of 3.2 DN makes two takes of 30 DN differ by an eighth of it."""
+    pairs = {1: stripes(8, contrast), 2: stripes(2, contrast)}
+    assert choose_pairs(pairs, SHAPE, NOISE) == chosen
 
 
 def test_a_take_is_the_same_where_light_reaches() -> None:
