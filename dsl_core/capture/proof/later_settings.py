@@ -27,20 +27,23 @@ class LaterSettings:
     def __init__(
         self,
         plan: CapturePlan,
+        first: int,
         calibration: Rig | None,
         noise: Noise,
         kept: Mapping[int, Counts],
         gained: Callable[[Shot, Counts], np.float32] = lambda shot, seen: np.float32(0),
         level: Callable[[Shot], float] = lambda shot: 1.0,
     ) -> None:
-        """``kept`` are the right pictures so far by the index of their shot; others may change it.
+        """``first`` is the setting whose code is judged by itself.
+
+        ``kept`` are the right pictures so far by the index of their shot; others may change it.
 
         ``gained`` says by how much black was more than its picture when the one of a shot was taken, DN, and
         ``level`` what its light was over that of white.
         """
         self._plan, self._calibration, self._noise, self._kept = plan, calibration, noise, kept
         self._gained, self._level = gained, level
-        self._first = min(plan.code_settings)
+        self._first = first
         shots = tuple(plan.shots())
         self._places = {(s.role, s.pattern): s.index for s in shots if s.setting == self._first}
         self._blacks = {s.setting: s.index for s in shots if s.role == "black"}

@@ -59,13 +59,14 @@ class SceneCheck:
         return found.is_told and found.mean > MIRRORED
 
     def is_unchanged(self, control: Shot, pixels: Mosaic) -> bool:
-        """Whether it does in the same light and contrast; False where its first picture is not known.
+        """Whether it does in the same light and contrast; False where that of the first code is not known.
 
         So it is for other pictures than those of the code: white does not show that something moved.
         """
         known = self._known
         before = known.kept.get(control.index)
-        if before is None or known.shots[control.index].role != "code":
+        first = known.shots[control.index]
+        if before is None or first.role != "code" or first.setting != known.first:
             return False
         return is_unchanged(known.raster.take(pixels), before, known.code_pairs(), known.noise)
 
@@ -134,7 +135,7 @@ class SceneCheck:
         """
         known = self._known
         ends, role = known.ends(known.first), known.plan.original(again).role
-        if self.unsettled or ends is None or role not in LEAST_CHANGE:
+        if self.unsettled or ends is None or role not in LEAST_CHANGE or again.setting != known.first:
             return
 
         def change(mosaic: Mosaic) -> float:

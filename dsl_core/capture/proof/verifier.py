@@ -133,6 +133,17 @@ class FrameProof:
         return tuple(each for each in (self._settled, self.scene.levels, self.scene.unsettled) if each)
 
     @property
+    def unproven(self) -> str:
+        """That no picture could be judged by the code, in a sentence; empty while that may still be."""
+        known = self._known
+        if known.first < max(known.plan.code_settings) or not known.says_nothing:
+            return ""
+        return (
+            "Whether pictures show their patterns could not be told: at no setting do enough pixels see the"
+            " code well. Choose an exposure and level at which white neither drowns in noise nor saturates."
+        )
+
+    @property
     def _settled(self) -> str:
         """That the light changed while the first code was captured, of which no frame shows it any more."""
         ratio = 1.0 if self._known.code is None else self._known.code.settled
@@ -184,6 +195,8 @@ class FrameProof:
     def _judge(self, shot: Shot, seen: Counts) -> Finding:
         known, before = self._known, self._last[1] if self._last is not None else None
         self.reviewed = []
+        if known.leave_code(shot):
+            self._later = LaterPictures(known)
         if shot.role == "sentinel":
             return self._judge_sentinel(shot, seen)
         if known.code is not None and shot.setting == known.first and shot.role != "spectral":
@@ -198,7 +211,7 @@ class FrameProof:
 
     def _judge_sentinel(self, shot: Shot, seen: Counts) -> Finding:
         known = self._known
-        places = [shot.pattern, known.blacks[known.first], known.places.get(("white", 0), -1)]
+        places = [shot.pattern, known.blacks[shot.setting], known.whites.get(shot.setting, -1)]
         before = known.plan.original(known.shots[shot.index - 1])
         old, black, white = (known.kept.get(place) for place in places)
         rivals = [self._later.expected.earlier(before), black, white]

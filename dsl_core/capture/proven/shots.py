@@ -73,6 +73,7 @@ class ProvenShots:
             what = "1 was" if self.corrected == 1 else f"{self.corrected} were"
             found.append(f"{what} captured again, because a picture did not show its pattern.")
             found += ["Everything was captured twice, since pictures came one late."] if self._is_late else []
+        found += [] if self._proof is None or not self._proof.unproven else [self._proof.unproven]
         return "".join(f" {each}" for each in (*found, *self._known_wrong))
 
     @property

@@ -24,7 +24,7 @@ def counts(value: int) -> Counts:
 
 
 def later(kept: dict[int, Counts] | None = None, is_calibrated: bool = True) -> LaterSettings:
-    return LaterSettings(PLAN, RIG if is_calibrated else None, NOISE, {} if kept is None else kept)
+    return LaterSettings(PLAN, 0, RIG if is_calibrated else None, NOISE, {} if kept is None else kept)
 
 
 def test_a_picture_that_the_first_setting_lacks_is_not_known() -> None:
@@ -84,7 +84,7 @@ def test_nothing_is_expected_of_what_was_not_seen_at_the_first_setting() -> None
     assert found is not None
     assert found.counts.tolist() == [310 + 0.5 * 600] * 4
     brighter = LaterSettings(
-        PLAN, RIG, NOISE, kept, lambda shot, seen: np.float32(shot.pattern * seen[0] / 9)
+        PLAN, 0, RIG, NOISE, kept, lambda shot, seen: np.float32(shot.pattern * seen[0] / 9)
     )
     brighter.measure(LATER_LINE, 0.5 / brighter.scale(LATER_LINE))
     without = brighter.expected(LATER_LINE, LATER_LINE)
@@ -92,7 +92,7 @@ def test_nothing_is_expected_of_what_was_not_seen_at_the_first_setting() -> None
     assert without.counts.tolist() == [310 + 0.5 * (600 - 100)] * 4, (
         "what black had gained in the old picture"
     )
-    dimmer = LaterSettings(PLAN, RIG, NOISE, kept, level=lambda shot: 0.8 if shot.index == 13 else 1.0)
+    dimmer = LaterSettings(PLAN, 0, RIG, NOISE, kept, level=lambda shot: 0.8 if shot.index == 13 else 1.0)
     dimmer.measure(LATER_LINE, 0.5 / dimmer.scale(LATER_LINE))
     in_usual_light = dimmer.expected(SHOTS[13], LATER_LINE)
     assert in_usual_light is not None

@@ -84,6 +84,21 @@ def test_light_that_depends_on_the_picture_before_is_told_from_a_lamp_that_drift
     assert taken == (asked if once in (900, 307) else [])
 
 
+def test_sentinels_of_a_setting_that_was_too_dark_are_compared_with_no_other_one() -> None:
+    scan: Any = known()
+    check, taken = SceneCheck(scan), list[Shot]()
+    scan.kept = {index: counts(1000 if shot.role == "white" else 300) for index, shot in enumerate(SHOTS)}
+    scan.first = 1
+
+    def take(shot: Shot, is_longer: bool) -> np.ndarray:
+        taken.append(shot)
+        return counts(300).reshape(18, 32)
+
+    check.see_settled(SHOTS[10], counts(900).reshape(18, 32), take)
+    assert (check.unsettled, taken) == ("", [])
+    assert not check.is_unchanged(SHOTS[2], counts(300).reshape(18, 32))
+
+
 def test_no_other_sentinel_is_asked_whether_it_settles() -> None:
     scan: Any = known()
     scan.kept = {10: counts(1000), 11: counts(300)}

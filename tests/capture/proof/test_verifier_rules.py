@@ -12,6 +12,7 @@ from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.model.plan import Shot
+from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.proof_rules import LINE, PLAN, SHOTS, counts
 
@@ -86,3 +87,43 @@ def test_the_finest_stripes_are_the_last_three_pairs(indices: tuple[int, ...], i
 
 def test_the_first_setting_is_that_of_the_first_code() -> None:
     assert proof().first_setting == 0
+
+
+#: Light that noise of usual cameras hides from most pixels.
+DIM_DN = 25.0
+
+
+def pictures(light_dn: tuple[float, float]) -> list[Counts]:
+    """Every pattern at the camera's own pixels, with so much light at each setting, and noise."""
+    rng = np.random.default_rng(0)
+    found = []
+    for shot in SHOTS:
+        shown = pattern_image(PLAN, shot)[:, :, 0] > 0
+        light = 300 + light_dn[shot.setting] * shown + rng.normal(0, 3, shown.shape)
+        found.append(light.round().astype(np.uint16))
+    return found
+
+
+@pytest.mark.parametrize("light_dn", [(DIM_DN, 1000.0), (300.0, 1000.0)], ids=["dark", "lit"])
+def test_the_code_of_the_next_setting_is_judged_by_itself_where_the_first_says_nothing(
+    light_dn: tuple[float, float],
+) -> None:
+    taken = pictures(light_dn)
+    clean = FrameProof(PLAN)
+    found = [clean.judge(*each) for each in zip(SHOTS, taken, strict=True)]
+    assert not any(each.is_wrong for each in found)
+    is_dark = light_dn[0] < 100
+    assert (clean.first_setting, clean.unproven) == (int(is_dark), "")
+    assert all(each.verdict is Verdict.RIGHT for each in found[29:]), "lines of the bright setting"
+    torn = FrameProof(PLAN)
+    taken[25] = np.vstack([taken[25][:9], taken[24][9:]])
+    found = [torn.judge(*each) for each in zip(SHOTS[:26], taken[:26], strict=True)]
+    assert found[25].is_wrong
+
+
+def test_a_scan_whose_code_says_nothing_at_any_setting_is_not_proven() -> None:
+    judge, taken = FrameProof(PLAN), pictures((DIM_DN, DIM_DN))
+    for shot in SHOTS[:28]:
+        assert judge.unproven == "", "a later code may be brighter"
+        judge.judge(shot, taken[shot.index])
+    assert "no setting do enough pixels see the" in judge.unproven

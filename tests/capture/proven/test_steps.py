@@ -49,6 +49,7 @@ class Bench:
         #: The colour that the first of two pictures of a shot has of the one before.
         self.colour = ""
         self.past: tuple[str, ...] = ()
+        self.unproven = ""
         #: How often white at half its level is compared, and what that says.
         self.whites_seen, self.levels = list[bool](), ""
         self.recalled: dict[int, str] = {}
@@ -236,6 +237,13 @@ def test_light_of_the_code_that_does_not_add_up_is_said_at_the_end() -> None:
     bench.shots.take(LINE)
     assert bench.shots.note.startswith(" Patterns and their inverses together have 1.30 ± 0.01 times")
     assert bench.shots.note.endswith(" The light has settled.")
+
+
+def test_that_no_picture_could_be_judged_is_said_at_the_end() -> None:
+    bench = Bench(is_right)
+    bench.unproven = "The code is dark."
+    bench.shots.take(LINE)
+    assert bench.shots.note == " The code is dark."
 
 
 def test_what_was_wrong_from_the_first_picture_on_is_said_at_the_end() -> None:

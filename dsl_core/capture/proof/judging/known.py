@@ -69,16 +69,21 @@ class Known:
         self.raster = Raster(plan.camera_size_px)
         self.noise = Noise.of(calibration.sensor if calibration else None, bit_depth)
         self.bayer = calibration.sensor.bayer if calibration else bayer
-        #: The setting whose code is judged by itself.
-        self.first = min(plan.code_settings)
-        #: Indices of the shots of that setting by role and pattern, and of black by setting.
-        self.places = {(s.role, s.pattern): s.index for s in self.shots if s.setting == self.first}
+        #: Indices of the shots of black and of white by setting.
         self.blacks = {s.setting: s.index for s in self.shots if s.role == "black"}
+        self.whites = {s.setting: s.index for s in self.shots if s.role == "white"}
         #: The right pictures by the index of their shot, and which of them said nothing by themselves.
         self.kept: dict[int, Counts] = {}
         self.untold: set[int] = set()
+        self._profiles: dict[tuple[Role, int], Floats | None] = {}
+        self._begin(min(plan.code_settings))
+
+    def _begin(self, setting: int) -> None:
+        #: The setting whose code is judged by itself, and indices of its shots by role and pattern.
+        self.first = setting
+        self.places = {(s.role, s.pattern): s.index for s in self.shots if s.setting == setting}
         self.learned = Learned(
-            UsualLight(self.first, knows_light and calibration is not None),
+            UsualLight(setting, self.knows_light and self.calibration is not None),
             LightSteps(),
             LinePlaces(),
             UsualVotes(),
@@ -86,7 +91,19 @@ class Known:
             set(),
         )
         self.code = self._first_code()
-        self._profiles: dict[tuple[Role, int], Floats | None] = {}
+
+    @property
+    def says_nothing(self) -> bool:
+        """Whether all of the first code is there, and no column is known: it is dark, or saturates."""
+        is_whole = self.code is not None and not self.code.lacking and self.ends(self.first) is not None
+        return is_whole and self.lit is None
+
+    def leave_code(self, shot: Shot) -> bool:
+        """Judge the code of a shot's setting by itself from now on, where that of one before says nothing."""
+        is_next = shot.role == "code" and shot.setting > self.first and self.says_nothing
+        if is_next:
+            self._begin(shot.setting)
+        return is_next
 
     def _first_code(self) -> FirstCode | None:
         plan = self.plan

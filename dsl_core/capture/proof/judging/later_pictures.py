@@ -32,7 +32,13 @@ class LaterPictures:
         """``known`` grows as pictures come."""
         self._known = known
         self.expected = LaterSettings(
-            known.plan, known.calibration, known.noise, known.kept, self._black_gained, self._level_of_code
+            known.plan,
+            known.first,
+            known.calibration,
+            known.noise,
+            known.kept,
+            self._black_gained,
+            self._level_of_code,
         )
 
     def judge(self, shot: Shot, seen: Counts) -> Finding:
