@@ -37,6 +37,8 @@ class Raster:
             self.rows = np.unique([*spread_rows(height, count - 1), BESIDE])
         #: Columns of the picture from one of the raster to the next: an even number would miss a colour.
         self.step_px = -(-width // _WIDTH) | 1
+        #: How many times as far apart its rows are as its columns.
+        self.rows_px = (height / self.rows.size) / self.step_px
         #: Rows and columns of the raster.
         self.shape = (self.rows.size, -(-width // self.step_px))
         self._mosaic = (self.rows[:, None] % 2) * 2 + np.arange(0, width, self.step_px)[None, :] % 2

@@ -72,6 +72,13 @@ class FirstCode:
         return self._lit
 
     @property
+    def says_nothing(self) -> bool:
+        """Whether all of it is there, and in too few pixels white is neither dark nor saturated."""
+        if self._missing or len(self._ends) < 2:
+            return False
+        return int(self._light()[2].sum()) < FEWEST_LIT
+
+    @property
     def _missing(self) -> bool:
         return 2 * len(self._pairs.pairs) < self._plan.code_count
 
@@ -253,18 +260,19 @@ class FirstCode:
 
     def _exchanged(self) -> tuple[int, ...]:
         _, _, lit = self._pairs.contrast()
-        size_px, pairs = self._plan.projector_size_px, self._pairs.pairs
-        trusted = lit & self._margins()
-        return exchanged_pairs(self._code, size_px, pairs, trusted, self._raster.shape, self._rises)
+        size_px, pairs, raster = self._plan.projector_size_px, self._pairs.pairs, self._raster
+        # Columns jump at edges of an exchanged pair, where pixels see both sides. Without these pixels, only
+        # a calibration, which says how columns rise, tells it.
+        trusted = lit if self._rises is None else lit & self._margins()
+        return exchanged_pairs(self._code, size_px, pairs, trusted, raster.shape, self._rises, raster.rows_px)
 
     def _is_mirrored(self) -> bool:
         if self._rises is None:
             return False
         _, _, lit = self._pairs.contrast()
-        size_px, pairs = self._plan.projector_size_px, self._pairs.pairs
-        return run_backwards(
-            self._code, size_px, pairs, lit & self._margins(), self._raster.shape, self._rises
-        )
+        size_px, pairs, raster = self._plan.projector_size_px, self._pairs.pairs, self._raster
+        trusted = lit & self._margins()
+        return run_backwards(self._code, size_px, pairs, trusted, raster.shape, self._rises, raster.rows_px)
 
     def _displaced(self) -> DisplacedCode | None:
         _, _, lit = self._pairs.contrast()
@@ -294,18 +302,22 @@ class FirstCode:
         return np.asarray(margin > LEAST_MARGIN * (bright - dark))
 
     def _located(self) -> Lit | None:
-        white, black = self._ends["white"], self._ends["black"]
+        contrast, sigma, sound = self._light()
         column, margin = decode(self._code, self._plan.projector_size_px, self._pairs.pairs)
-        contrast = white.astype(np.float32) - black.astype(np.float32)
-        sigma = np.sqrt(self._noise.variance(white) + self._noise.variance(black))
-        sound = (column >= 0) & (contrast > 12 * sigma) & (margin > LEAST_MARGIN * contrast)
-        # Where white saturates, nobody knows how bright a line and the blur beside it will be.
-        sound &= white < self._noise.sensor.full_scale_dn
-        index = np.flatnonzero(sound)
+        index = np.flatnonzero(sound & (column >= 0) & (margin > LEAST_MARGIN * contrast))
         if index.size < FEWEST_LIT:
             return None
         key = (3 * column[index] + self._channels[index]).astype(np.intp)
-        return Lit(index, key, black[index].astype(np.float32), contrast[index], sigma[index])
+        black = self._ends["black"][index].astype(np.float32)
+        return Lit(index, key, black, contrast[index], sigma[index])
+
+    def _light(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """White less black, its deviation, and where that says enough."""
+        white, black = self._ends["white"], self._ends["black"]
+        contrast = white.astype(np.float32) - black.astype(np.float32)
+        sigma = np.sqrt(self._noise.variance(white) + self._noise.variance(black))
+        # Where white saturates, nobody knows how bright a line and the blur beside it will be.
+        return contrast, sigma, (contrast > 12 * sigma) & (white < self._noise.sensor.full_scale_dn)
 
     def _explain(self, pair: Pair, expected: Floats, broken: NDArray[np.bool_]) -> tuple[Verdict, str]:
         """What a pair that breaks the sum shows instead."""

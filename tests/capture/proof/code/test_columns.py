@@ -56,6 +56,47 @@ def test_an_exchanged_pair_is_among_the_suspects(number: int) -> None:
     assert number in _suspects(number)
 
 
+def _seen(code_at: NDArray[np.int64], exchanged: int | None) -> tuple[int, ...]:
+    """Suspects of an uncalibrated camera whose pixels see code blurred over three columns."""
+    found = {}
+    for number in range(8):
+        one, other = (
+            sum(
+                code_image(CODE, SIZE, 2 * number + inverse)[0, np.clip(code_at + by, 0, 255)].astype(float)
+                for by in (-1, 0, 1)
+            ).astype(np.uint16).ravel()
+            for inverse in (0, 1)
+        )  # fmt: skip
+        found[number] = (other, one) if number == exchanged else (one, other)
+    return exchanged_pairs(CODE, SIZE, found, np.ones(code_at.size, bool), code_at.shape, None)
+
+
+@pytest.mark.parametrize("exchanged", [None, 3, 4, 5, 6])
+@pytest.mark.parametrize("turn", ["as it is", "upside down", "upright", "upright, the other way"])
+def test_a_pair_is_named_however_an_uncalibrated_camera_is_turned(turn: str, exchanged: int | None) -> None:
+    across = np.tile(COLUMN, (20, 1))
+    turned = {
+        "as it is": across,
+        "upside down": across[:, ::-1],
+        "upright": across.T,
+        "upright, the other way": across.T[::-1],
+    }[turn]
+    assert _seen(turned, exchanged) == (() if exchanged is None else (exchanged,))
+
+
+def test_an_upright_camera_is_not_mirrored_where_surfaces_are_tilted() -> None:
+    """Columns fall along its rows by a tilt, and change three times as much down its picture."""
+    down, across = np.mgrid[:100, :30]
+    column = (2.1 * down + 25 - 0.7 * across).astype(int)
+    pairs = {}
+    for number in range(8):
+        one, other = (code_image(CODE, SIZE, 2 * number + inverse)[0, column].ravel() for inverse in (0, 1))
+        pairs[number] = one.astype(np.uint16), other.astype(np.uint16)
+    trusted = np.ones(column.size, bool)
+    assert not run_backwards(CODE, SIZE, pairs, trusted, column.shape, True)
+    assert run_backwards(CODE, SIZE, pairs, trusted, column.shape, True, rows_px=40.0), "rows are far apart"
+
+
 @pytest.mark.parametrize("number", [6, 7])
 def test_a_fine_pair_is_named_alone(number: int) -> None:
     assert _suspects(number) == (number,)
@@ -66,7 +107,7 @@ def test_a_picture_turned_around_says_nothing_where_nobody_knows_which_way_colum
 
 
 def judged(row: list[int]) -> tuple[float, float] | None:
-    return _Neighbours((1, len(row)), np.ones(len(row), bool)).judge(np.array(row, np.int32))
+    return _Neighbours((1, len(row)), np.ones(len(row), bool), np.array(row, np.int32)).as_taken
 
 
 @pytest.mark.parametrize("rises", [True, False])
@@ -86,7 +127,7 @@ def test_neighbours_are_judged_from_sixty_triples_on() -> None:
     # Column 0 is as good as any.
     assert judged(list(range(62))) == (0.0, 1.0)
     assert judged([-1, *range(1, 62)]) is None
-    assert _Neighbours((1, 62), np.arange(62) > 0).judge(np.arange(62, dtype=np.int32)) is None
+    assert _Neighbours((1, 62), np.arange(62) > 0, np.arange(62, dtype=np.int32)).as_taken is None
 
 
 def test_columns_rise_by_steps_of_up_to_twenty() -> None:
@@ -100,15 +141,15 @@ def test_columns_rise_by_steps_of_up_to_twenty() -> None:
 
 
 def test_roughness_is_the_mean_second_difference_clipped_at_six_times_the_first_median() -> None:
-    asked = _Neighbours((1, 70), np.ones(70, bool))
     step = np.r_[np.zeros(35), np.full(35, 30)].astype(np.int32) + np.arange(70, dtype=np.int32)
+    asked = _Neighbours((1, 70), np.ones(70, bool), step)
     # Two second differences of thirty, at a median below one: six of each count.
-    assert asked.judge(step) == pytest.approx((12 / 68, 1.0))
+    assert asked.as_taken == pytest.approx((12 / 68, 1.0))
     saw = (9 * (np.arange(70) % 2)).astype(np.int32)
     found = asked.judge(saw)
     assert found is not None
     assert found[0] == 6.0, "the first picture's clip stays"
-    own = _Neighbours((1, 70), np.ones(70, bool)).judge(saw)
+    own = _Neighbours((1, 70), np.ones(70, bool), saw).as_taken
     assert own is not None
     assert own[0] == 18.0
 
@@ -128,6 +169,8 @@ def suspects_of(
     """The suspects where pairs exchanged (None: as taken) leave columns so rough, so far rising."""
 
     class Known:
+        is_upright, as_taken = False, table[None]
+
         def __init__(self, *_: object) -> None: ...
 
         def judge(self, number: int | None) -> tuple[float, float] | None:
@@ -160,6 +203,13 @@ def test_of_columns_turned_around_all_pairs_that_leave_them_nearly_as_smooth_are
     table: dict[int | None, tuple[float, float] | None] = {0: (2.9, 0.9), 1: (1.0, 0.9), 2: (3.1, 0.9)}
     assert suspects_of(monkeypatch, {None: (1.0, 0.19), **table}) == (0, 1)
     assert suspects_of(monkeypatch, {None: (1.0, 0.19), **table}, rises=None) == ()
+    assert suspects_of(monkeypatch, {None: (2.9, 0.19), **table}, rises=None) == (1,)
+    turned = {**table, 1: (1.0, -0.9)}
+    assert suspects_of(monkeypatch, {None: (2.9, 0.19), **turned}, rises=None) == (1,), "whichever way"
+    assert suspects_of(monkeypatch, {None: (2.9, 0.19), **turned, 2: (1.3, 0.9)}, rises=None) == ()
+    assert suspects_of(monkeypatch, {None: (2.9, 0.19), **turned, 1: (1.0, 0.5)}, rises=None) == ()
+    rough: dict[int | None, tuple[float, float] | None] = {0: (29.0, 0.9), 1: (2.1, 0.9), 2: (31.0, 0.9)}
+    assert suspects_of(monkeypatch, {None: (29.0, 0.9), **rough}, rises=None) == (), "columns at random"
     assert suspects_of(monkeypatch, {None: (1.0, 0.2), **table}) == ()
 
 
@@ -175,7 +225,7 @@ def test_only_neighbours_that_are_both_trusted_say_whether_columns_rise() -> Non
     # From the seventieth on every second one is not trusted, and far below its neighbours.
     row[71::2] -= 15
     trusted[71::2] = False
-    assert _Neighbours((1, 90), trusted).judge(row) == (0.0, 1.0)
+    assert _Neighbours((1, 90), trusted, row).as_taken == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("rises", [True, False])

@@ -351,3 +351,25 @@ def test_the_other_half_of_a_forgotten_picture_is_judged_with_the_next_one(numbe
     assert code.lit is None
     assert code.add(inverse, seen(inverse), None).verdict is Verdict.RIGHT
     assert code.lit is not None
+
+
+@pytest.mark.parametrize("exchanged", [None, 5, 6])
+@pytest.mark.parametrize("turn", [1, -1])
+def test_an_exchanged_pair_is_told_where_pixels_see_several_columns(exchanged: int | None, turn: int) -> None:
+    """Pixels at its edges see both sides, and without them no neighbours of a fine pair span one."""
+    plan = PLAN.model_copy(update={"camera_size_px": (80, 48), "projector_size_px": (256, 18)})
+    shots = [shot for shot in plan.shots() if shot.role in ("code", "white", "black")]
+    raster, edges = Raster(plan.camera_size_px), np.linspace(0, 256, 81)
+    assert isinstance(plan.code, GrayCode)
+    code = FirstCode(plan, plan.code, shots, raster, Noise(SENSOR), "RGGB", None)
+    wrong = []
+    for shot in shots:
+        is_of_pair = shot.role == "code" and shot.pattern // 2 == exchanged
+        shown = shots[shot.index + 1 - 2 * (shot.pattern % 2)] if is_of_pair else shot
+        row = np.r_[0.0, np.cumsum(pattern_image(plan, shown)[0, :, 1] / 255.0)]
+        light = np.diff(np.interp(edges, np.arange(257), row))[::turn] / 3.2
+        picture = np.tile(SENSOR.black_level_dn + 2000.0 * light, (48, 1)).astype(np.uint16)
+        found = code.add(shot, raster.take(picture), None)
+        wrong += [found] if found.is_wrong else []
+    names = {each.pattern // 2 for found in wrong for each in found.again}
+    assert names == (set() if exchanged is None else {exchanged})
