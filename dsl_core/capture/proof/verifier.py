@@ -136,11 +136,11 @@ class FrameProof:
     def unproven(self) -> str:
         """That no picture could be judged by the code, in a sentence; empty while that may still be."""
         known = self._known
-        if known.first < max(known.plan.code_settings) or not known.says_nothing:
+        if known.first < max(known.plan.code_settings) or known.code is None or not known.code.says_nothing:
             return ""
         return (
-            "Whether pictures show their patterns could not be told: at no setting do enough pixels see the"
-            " code well. Choose an exposure and level at which white neither drowns in noise nor saturates."
+            "Whether pictures show their patterns could not be told: at no setting with the code is white"
+            " neither lost in noise nor saturated. Choose other exposures or levels."
         )
 
     @property

@@ -92,18 +92,13 @@ class Known:
         )
         self.code = self._first_code()
 
-    @property
-    def says_nothing(self) -> bool:
-        """Whether all of the first code is there, and no column is known: it is dark, or saturates."""
-        is_whole = self.code is not None and not self.code.lacking and self.ends(self.first) is not None
-        return is_whole and self.lit is None
-
     def leave_code(self, shot: Shot) -> bool:
         """Judge the code of a shot's setting by itself from now on, where that of one before says nothing."""
-        is_next = shot.role == "code" and shot.setting > self.first and self.says_nothing
-        if is_next:
-            self._begin(shot.setting)
-        return is_next
+        is_next = shot.role == "code" and shot.setting > self.first
+        if self.code is None or not is_next or not self.code.says_nothing:
+            return False
+        self._begin(shot.setting)
+        return True
 
     def _first_code(self) -> FirstCode | None:
         plan = self.plan
