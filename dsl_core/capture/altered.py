@@ -30,8 +30,9 @@ CHANGED, KEPT = 0.15, 0.05
 NO_LIGHT, FEWEST_ROWS, MOST_ROWS = 0.05, 2, 0.7
 #: Rows of which pixels work have this share of the noise of black that they had, and black but for so much.
 ALIVE, SAME_BLACK_DN = 0.6, 2.0
-#: Pictures are clipped where this share of the pixels has the largest value, below this share of full scale.
-CLIPPED, BELOW_FULL = 0.01, 0.9
+#: Pictures are clipped where this share of the pixels has the largest value, below this share of full scale,
+#: and so many times as many as the two values below it, which noise of a flat surface fills as well.
+CLIPPED, BELOW_FULL, PILED = 0.01, 0.9, 2
 #: A picture alone says so with more than this share of full scale.
 BRIGHT_SHARE = 0.2
 #: White follows that of before by another power than one by so much, alike in every colour, and as closely as
@@ -161,44 +162,49 @@ def _dark_rows(before: Pictures, now: Pictures, sensor: Sensor) -> str:
 
 def _clipped(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
     """Whether white ends below full scale, all of it or one colour."""
-    of_all = _limit_of(before.ravel(), now.ravel(), sensor)
+    of_all = _new_limit(before, now, sensor)
     if of_all is not None:
-        return _said_of_limit("", *of_all)
+        return _said_of_limit("white", *of_all)
     sites = np.array(colour_sites(sensor.bayer)).reshape(2, 2)
     for colour, name in enumerate(COLOUR_NAMES):
         own = np.tile(sites == colour, (now.shape[0] // 2 + 1, now.shape[1] // 2 + 1))
         own = own[: now.shape[0], : now.shape[1]]
-        found = _limit_of(before[own], now[own], sensor) if own.any() else None
+        found = _new_limit(before[own], now[own], sensor) if own.any() else None
         if found is not None:
-            return _said_of_limit(f" in {name}", *found)
+            return _said_of_limit(f"white in {name}", *found)
     return ""
 
 
 def ends_early(picture: Mosaic, sensor: Sensor) -> str:
     """Whether the counts of a bright picture end below full scale; empty if they do not."""
-    most = int(picture.max())
-    share = float((picture == most).mean())
-    is_bright = most - sensor.black_level_dn > BRIGHT_SHARE * (sensor.full_scale_dn - sensor.black_level_dn)
-    if not is_bright or most >= BELOW_FULL * sensor.full_scale_dn or share < CLIPPED:
+    found = _limit_of(picture, sensor)
+    range_dn = sensor.full_scale_dn - sensor.black_level_dn
+    if found is None or found[0] - sensor.black_level_dn <= BRIGHT_SHARE * range_dn:
         return ""
-    return (
-        f"No pixel of it has more than {most} DN, and {share:.0%} have just that: the camera saturates below"
-        " its full scale. Set gain, bit depth and limits of its driver as they were."
-    )
+    return _said_of_limit("it", *found)
 
 
-def _limit_of(before: Mosaic, now: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
-    """The value that counts end at and did not before, and the share of pixels that have it; None if none."""
-    most = int(now.max())
-    shares = [float((each == each.max()).mean()) for each in (before, now)]
-    if most >= BELOW_FULL * sensor.full_scale_dn or shares[1] < CLIPPED or shares[0] > shares[1] / 4:
+def _limit_of(picture: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
+    """The value below full scale that counts pile up at, and the share of pixels that have it."""
+    values, counts = np.unique(picture, return_counts=True)
+    most, share = int(values[-1]), float(counts[-1]) / picture.size
+    is_piled_up = counts[-1] > PILED * counts[-3:-1].sum()
+    if most >= BELOW_FULL * sensor.full_scale_dn or share < CLIPPED or not is_piled_up:
         return None
-    return most, shares[1]
+    return most, share
+
+
+def _new_limit(before: Mosaic, now: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
+    """The limit of ``now`` if the counts of ``before`` did not end like that."""
+    found = _limit_of(now, sensor)
+    if found is None or float((before == before.max()).mean()) > found[1] / 4:
+        return None
+    return found
 
 
 def _said_of_limit(where: str, most: int, share: float) -> str:
     return (
-        f"No pixel of white{where} has more than {most} DN, and {share:.0%} have just that: the camera"
+        f"No pixel of {where} has more than {most} DN, and {share:.0%} have just that: the camera"
         " saturates below its full scale. Set gain, bit depth and limits of its driver as they were."
     )
 

@@ -179,3 +179,21 @@ def test_a_bright_picture_whose_counts_end_below_full_scale_says_so_alone(
 def test_neither_black_nor_a_sound_white_ends_early() -> None:
     white, black, code = pictures(1)
     assert [ends_early(each, SENSOR) for each in (white, black, code)] == ["", "", ""]
+
+
+@pytest.mark.parametrize(("light_dn", "most_dn", "is_told"), [(80, 255, False), (160, 127, True)])
+def test_a_flat_white_of_few_values_is_cut_off_only_where_they_pile_up(
+    light_dn: float, most_dn: int, is_told: bool
+) -> None:
+    sensor = Sensor(bit_depth=8, black_level_dn=4, electrons_per_dn=200, read_noise_dn=0.3)
+    rng = np.random.default_rng(1)
+
+    def flat(light_dn: float) -> NDArray[np.uint16]:
+        sigma = np.sqrt(sensor.read_noise_dn**2 + light_dn / sensor.electrons_per_dn)
+        counts = np.rint(sensor.black_level_dn + light_dn + rng.normal(0, sigma, (64, 96)))
+        return counts.clip(0, sensor.full_scale_dn).astype(np.uint16)
+
+    # One pixel in a hundred and more has the largest value, cut off or not.
+    white = np.minimum(flat(light_dn), most_dn)
+    said = alteration((flat(160), flat(0), flat(80)), (white, flat(0), flat(40)), sensor)
+    assert ["saturates below" in each for each in (said, ends_early(white, sensor))] == [is_told] * 2
