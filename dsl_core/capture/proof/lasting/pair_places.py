@@ -63,6 +63,8 @@ def pair_places(
         if stripes is None:
             continue
         slope = _slope(np.asarray(stripes, np.float32))[column]
+        if not slope.any():
+            continue
         apart = one[lit.index].astype(np.float32) + other[lit.index] - 2 * lit.black
         apart = apart / lit.contrast - 1
         apart -= np.median(apart)
@@ -71,8 +73,11 @@ def pair_places(
         if int(flat.sum()) >= FEWEST_FLAT:
             # Texture, and light that changed, count as noise does: as much as they do away from edges.
             sigma = sigma * max(1.0, float(robust_std(apart[flat] / sigma[flat])))
-        weight = slope / sigma**2
-        total = float(weight @ slope)
+        # Values that are not proportional to the light make edges brighter that rise and those that fall.
+        steep = np.abs(slope)
+        odd = slope - steep * np.average(np.sign(slope), weights=(slope / sigma) ** 2)
+        weight = odd / sigma**2
+        total = float(weight @ odd)
         if total <= 0:
             continue
         moved, std = float(weight @ apart) / total, total**-0.5

@@ -17,20 +17,26 @@ CODE = GrayCode(rows=False)
 
 
 def found(
-    columns: int, pairs: tuple[int, ...] = (0, 1, 2, 3, 4, 5), light: float = 1.0, room: float = 0.0
+    columns: int,
+    pairs: tuple[int, ...] = (0, 1, 2, 3, 4, 5),
+    light: float = 1.0,
+    room: float = 0.0,
+    power: float = 1.0,
+    view: tuple[int, int] = (0, SIZE[0]),
 ) -> PairPlaces | None:
     """With inverses of some pairs displaced by so many columns, in so much of the light of patterns.
 
-    ``room`` is light of the room that came after black, as a share of the light.
+    ``room`` is light of the room that came after black, as a share of the light, ``power`` that by which
+    counts follow the light; the camera sees the columns of the ``view``, from the first up to the last.
     """
     rng = np.random.default_rng(5)
-    column = np.tile(np.arange(SIZE[0]), ROWS)
+    column = np.tile(np.arange(*view), ROWS)
     surface = WHITE * rng.uniform(0.5, 1.0, column.size)
 
     def seen(light: NDArray[np.float64]) -> Counts:
         wide = np.pad(light, 1, mode="edge")
         blurred = 0.25 * wide[:-2] + 0.5 * wide[1:-1] + 0.25 * wide[2:]
-        counts = blurred[column] * surface + BLACK + rng.normal(0, 10, column.size)
+        counts = blurred[column] ** power * surface + BLACK + rng.normal(0, 10, column.size)
         return np.rint(counts).astype(np.uint16)
 
     taken = {}
@@ -68,3 +74,12 @@ def test_a_room_that_became_brighter_hides_no_displacement() -> None:
 
 def test_a_single_pair_may_have_moved_for_itself() -> None:
     assert found(1, pairs=(3,)) is None
+
+
+@pytest.mark.parametrize("power", [0.45, 0.7])
+def test_values_not_proportional_to_light_displace_nothing(power: float) -> None:
+    # Two coarse pairs have one edge here, which rises.
+    assert found(0, power=power, view=(100, 170)) is None
+    one = found(1, power=power)
+    assert one is not None
+    assert one.columns == pytest.approx(1, rel=0.45)
