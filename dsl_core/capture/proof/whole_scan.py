@@ -10,6 +10,7 @@ from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.ends import sentences_of_ends
 from dsl_core.capture.proof.lasting.pair_places import pair_places
+from dsl_core.capture.proof.lasting.sharp_edges import sharp_edges
 from dsl_core.capture.proof.lasting.soft_stripes import soft_stripes
 from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
 from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
@@ -91,9 +92,15 @@ class WholeScan:
                 known.raster,
                 with_colours,
             )
-        return [
-            each for each in (*said, self._code_colours(), self._pair_places(), self._soft_stripes()) if each
-        ]
+        of_code = self._sharp_edges(), self._code_colours(), self._pair_places(), self._soft_stripes()
+        return [each for each in (of_code[0], *said, *of_code[1:]) if each]
+
+    def _sharp_edges(self) -> str:
+        known = self._known
+        ends = known.ends(known.first)
+        if known.lit is None or ends is None:
+            return ""
+        return sharp_edges(known.code_pairs(), ends, known.noise, known.raster)
 
     def _code_colours(self) -> str:
         known = self._known

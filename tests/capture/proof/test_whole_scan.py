@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.devices.base import DeviceRig
@@ -12,14 +14,16 @@ from tests.cases.rendered_rig import RenderedScene, render, token_image
 PLAN = CapturePlan(code=GrayCode(rows=True), spectral=NoSpectral())
 
 
-def said_of(scene: RenderedScene) -> str:
-    """What is wrong from the first picture on."""
+def said_of(scene: RenderedScene, sharpened: float = 0.0) -> str:
+    """What is wrong from the first picture on, by a camera that sharpens its pictures by so much."""
     proof = FrameProof(scene.plan, scene.calibration)
     rig: DeviceRig = scene.open()
     for shot in scene.plan.shots():
         rig.camera.configure(shot.exposure_ms)
         rig.projector.show(token_image(scene.plan, shot))
-        proof.judge(shot, rig.camera.snap().pixels)
+        pixels = rig.camera.snap().pixels.astype(np.float64)
+        pixels += sharpened * (pixels - gaussian_filter(pixels, 1.5))
+        proof.judge(shot, np.rint(pixels).clip(0, scene.calibration.sensor.full_scale_dn).astype(np.uint16))
     return " ".join(proof.whole.lasting())
 
 
@@ -27,3 +31,9 @@ def said_of(scene: RenderedScene) -> str:
 def test_a_scan_says_that_its_camera_is_out_of_focus(defocus_px: str, is_soft: bool) -> None:
     scene = render(PLAN, scene="color-checker", size="112x72", defocus_px=defocus_px)
     assert ("out of focus" in said_of(scene)) == is_soft
+
+
+@pytest.mark.parametrize(("sharpened", "is_told"), [(0.0, False), (0.3, True)])
+def test_a_scan_says_that_its_camera_sharpens(sharpened: float, is_told: bool) -> None:
+    said = said_of(render(PLAN, scene="color-checker", size="112x72"), sharpened)
+    assert said.startswith("Edges of the code's stripes are brighter than white") == is_told
