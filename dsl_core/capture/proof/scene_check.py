@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,18 @@ class SceneCheck:
         """Whether a raw mosaic of the shot that `controls` named shows what it showed at first."""
         known = self._known
         return is_same(known.raster.take(pixels), known.kept[control.index], known.code_pairs(), known.noise)
+
+    def repeats(
+        self, shots: Sequence[Shot], before: Mapping[Shot, Mosaic], now: Mapping[Shot, Mosaic]
+    ) -> bool:
+        """Whether raw mosaics of whole pairs of the first code show the same ``before`` and ``now``."""
+        known = self._known
+        are_ours = all(shot.role == "code" and shot.setting == known.first for shot in shots)
+        if not are_ours or not set(shots) <= before.keys() & now.keys():
+            return False
+        take = known.raster.take
+        both = {shot.index: (take(before[shot]), take(now[shot])) for shot in shots}
+        return all(is_same(seen, old, both, known.noise) for old, seen in both.values())
 
     def shows_mirrored(self, control: Shot, pixels: Mosaic) -> bool:
         """Whether a raw mosaic of it shows its pattern the other way round, by columns that pixels see."""

@@ -231,6 +231,7 @@ class ProvenShots:
         return replace(third, corrected="two pictures of it differed"), proof.judge(alone.shot, third.pixels)
 
     def _correct(self, found: Finding, proof: FrameProof) -> None:
+        before, now = dict[Shot, NDArray[np.uint16]](), dict[Shot, NDArray[np.uint16]]()
         for earlier in range(len(SETTLE_MS)):
             if not found.is_wrong:
                 return
@@ -244,6 +245,7 @@ class ProvenShots:
             for shot in wrong:
                 frame = replace(self._again(shot, earlier), corrected=reason)
                 taken.append((shot, frame, proof.judge(shot, frame.pixels)))
+            before, now = now, {shot: frame.pixels for shot, frame, _ in taken}
             found = last_wrong([each for *_, each in taken])
             if len(wrong) > 1 and wrong[-1].role == "spectral" and not found.is_wrong:
                 # They agree now; but so do two wrong ones, and the earlier one may have been right.
@@ -257,7 +259,8 @@ class ProvenShots:
             if not change.sentence:
                 of_picture = self._diagnosis.explain_picture(frame.pixels)
                 change = of_picture if of_picture.sentence else change
-            advice = f"{what_to_do(found, change, proof)} {self._next_step.then}"
+            is_steady = proof.scene.repeats(found.again, before, now)
+            advice = f"{what_to_do(found, change, proof, is_steady)} {self._next_step.then}"
             if self._known_wrong and not change.sentence:
                 advice = " ".join(self._known_wrong)
             raise PictureError(

@@ -32,6 +32,12 @@ _FINE = (
     " that is not its own, overscan, keystone) or sharpened, or something is out of focus or trembles. Send"
     " the projector pictures of its own size, switch such corrections off, and check the focus."
 )
+#: The same of pairs of the code that add up to something else than others, whenever they are captured.
+_NOT_ADDED_UP = (
+    "It looks the same each time, and nothing shows that anything moved: the camera's values may not be"
+    " proportional to the light of each pixel alone. Switch gamma, compression, sharpening and noise"
+    " reduction of the camera off, and store raw values. If that is not why:"
+)
 
 
 class PictureError(DeviceError):
@@ -46,8 +52,11 @@ class PictureError(DeviceError):
         self.wrong, self.has_changed = wrong, has_changed
 
 
-def what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
-    """Why a picture stays wrong as far as that is known, and what to do about it."""
+def what_to_do(found: Finding, change: Explanation, proof: FrameProof, is_steady: bool) -> str:
+    """Why a picture stays wrong as far as that is known, and what to do about it.
+
+    A pair of the code ``is_steady`` that looks the same whenever it is captured again.
+    """
     if found.verdict is Verdict.HIDDEN and not change.is_of_all:
         # Who stands there is in the pictures that would say what has changed, too.
         return found.remedy
@@ -58,6 +67,8 @@ def what_to_do(found: Finding, change: Explanation, proof: FrameProof) -> str:
             return _TONE
     if not change.sentence and proof.are_finest(found.again):
         return _FINE
+    if not change.sentence and is_steady and found.verdict is Verdict.OTHER:
+        return f"{_NOT_ADDED_UP} {found.remedy}"
     if change.is_slight:
         return f"{change.sentence} If that is not why: {found.remedy}"
     return change.sentence or found.remedy

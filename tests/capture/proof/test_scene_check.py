@@ -32,6 +32,16 @@ def test_the_first_pictures_are_named_once_the_code_is_whole(monkeypatch: pytest
     assert [shot.index for shot in check.code_after(SHOTS[2])] == list(range(3, 12))
 
 
+@pytest.mark.parametrize(("moved_px", "repeats"), [(0, True), (4, False)])
+def test_a_pair_repeats_where_both_of_its_pictures_show_the_same_again(moved_px: int, repeats: bool) -> None:
+    check, pair = SceneCheck(known()), SHOTS[4:6]
+    shown = {shot: (260 + 1000 * (pattern_image(PLAN, shot)[:, :, 0] > 0)).astype(np.uint16) for shot in pair}
+    again = {**shown, pair[1]: np.roll(shown[pair[1]], moved_px, 1)}
+    assert check.repeats(pair, shown, again) == repeats
+    assert not check.repeats(SHOTS[2:6], shown, again), "the first of them were not captured again"
+    assert not check.repeats(pair[:1], shown, again), "half a pair"
+
+
 def test_a_control_is_mirrored_where_pixels_see_what_their_columns_show_on_the_other_side() -> None:
     scan: Any = known()
     check, column = SceneCheck(scan), np.tile(np.arange(32), 18)

@@ -59,6 +59,7 @@ class Bench:
         self.settling: tuple[bool, ...] = ()
         self.of_code: CodeSum | None = None
         self.of_ends: list[str] = []
+        self.is_steady = False
         self.scene = self.whole = self
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
@@ -88,6 +89,9 @@ class Bench:
             self.odd_controls -= 1
             return False
         return self._same or control.index == 0
+
+    def repeats(self, shots: Sequence[Shot], before: dict[Shot, Any], now: dict[Shot, Any]) -> bool:
+        return self.is_steady and set(shots) <= before.keys() & now.keys()
 
     def shows_mirrored(self, control: Shot, pixels: object) -> bool:
         return self.is_mirrored
@@ -353,6 +357,23 @@ def test_only_the_finest_stripes_are_wrong_where_pictures_are_scaled(cause: str,
     bench = Bench(lambda shot: Finding(shot, Verdict.TORN, (shot,)))
     bench.cause, bench.fine = cause, True
     with pytest.raises(PictureError, match=rf"the rest another one\. {said}"):
+        bench.shots.take(CODE)
+
+
+@pytest.mark.parametrize(
+    ("is_steady", "cause", "said"),
+    [
+        (True, "", "It looks the same each time, .* Switch gamma, compression, .* Check that camera"),
+        (True, "It moved.", "It moved"),
+        (False, "", "Check that camera"),
+    ],
+)
+def test_pairs_that_never_add_up_are_of_a_camera_that_alters_them(
+    is_steady: bool, cause: str, said: str
+) -> None:
+    bench = Bench(lambda shot: Finding(shot, Verdict.OTHER, (shot,)))
+    bench.cause, bench.is_steady = cause, is_steady
+    with pytest.raises(PictureError, match=rf"it shows something else\. {said}"):
         bench.shots.take(CODE)
 
 
