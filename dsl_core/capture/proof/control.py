@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.capture.proof.code.code_pairs import Pair, alike
 from dsl_core.capture.proof.noise import Noise
@@ -84,12 +85,17 @@ def is_unchanged(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise:
 
 
 def edges_moved(
-    seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise, shape: tuple[int, int]
+    seen: Counts,
+    before: Counts,
+    pairs: Mapping[int, Pair],
+    noise: Noise,
+    shape: tuple[int, int],
+    channels: NDArray[np.int8],
 ) -> bool:
     """Whether edges of a picture of the code are not where they were ``before``, in whatever light.
 
     A pixel may see several columns of the projector, so that a displaced picture changes little of each; all
-    pixels near an edge together tell. ``shape`` is that of the raster.
+    pixels near an edge together tell. ``shape`` is that of the raster, ``channels`` the colour of each pixel.
     """
     every = [picture for pair in pairs.values() for picture in pair]
     dark, contrast = np.minimum.reduce(every).astype(np.float32), _contrast(pairs.values())
@@ -109,8 +115,9 @@ def edges_moved(
     near &= sound
     if int(steep.sum()) < FEWEST_NEAR:
         return False
-    # Light of the projector and of the room may have changed meanwhile.
-    terms = np.stack([slope[near], old[near], np.ones(int(near.sum()))], 1)
+    # Light of the projector and of the room may have changed meanwhile, and the camera's balance of colours.
+    own = [channels.reshape(shape)[near] == colour for colour in np.unique(channels)]
+    terms = np.stack([slope[near], *(old[near] * each for each in own), *own], 1)
     found, *_ = np.linalg.lstsq(terms, new[near] - old[near], rcond=None)
     left = new[near] - old[near] - terms @ found
     deviation = np.maximum(sigma.reshape(shape)[near] / share.reshape(shape)[near], left.std())

@@ -105,7 +105,8 @@ class SceneCheck:
         """Whether a raw mosaic of one of the `first_pictures` shows its pattern elsewhere than at first."""
         known = self._known
         seen, before = known.raster.take(pixels), known.kept[first.index]
-        return edges_moved(seen, before, known.code_pairs(), known.noise, known.raster.shape)
+        channels = known.raster.channels(known.bayer)
+        return edges_moved(seen, before, known.code_pairs(), known.noise, known.raster.shape, channels)
 
     def whites(self) -> tuple[Shot, Shot] | None:
         """White of the first code, and white at half its level, by which `compare_whites` knows the levels.

@@ -114,6 +114,8 @@ def test_gains_of_colours_that_follow_the_picture_are_a_change(
 
 
 ROWS = 40
+COLOURS = np.tile(np.array([0, 2], np.int8), (ROWS, 8))
+ONE_COLOUR = np.zeros_like(COLOURS)
 
 
 def edge(at: float, low: float = 120.0, high: float = 280.0, seed: int = 0, noise: float = 3.0) -> np.ndarray:
@@ -125,9 +127,9 @@ def edge(at: float, low: float = 120.0, high: float = 280.0, seed: int = 0, nois
     )
 
 
-def moved(seen: np.ndarray, before: np.ndarray) -> bool:
+def moved(seen: np.ndarray, before: np.ndarray, colours: np.ndarray = ONE_COLOUR) -> bool:
     on, off = edge(0), edge(16)
-    return edges_moved(seen, before, {1: (on, off), 2: (off, on)}, NOISE, (ROWS, 16))
+    return edges_moved(seen, before, {1: (on, off), 2: (off, on)}, NOISE, (ROWS, 16), colours.ravel())
 
 
 @pytest.mark.parametrize(("low", "high"), [(120, 280), (120, 240), (140, 300)])
@@ -137,6 +139,13 @@ def test_an_edge_that_is_displaced_has_moved_in_any_light(low: float, high: floa
     assert not moved(edge(8.42, low, high, 2), before), "a fiftieth of a pixel is no motion"
     assert moved(edge(8.7, low, high, 3), before)
     assert moved(edge(7.6, low, high, 4), before)
+
+
+@pytest.mark.parametrize(("at", "is_told"), [(7.6, False), (7.9, True)])
+def test_colours_that_a_camera_balances_otherwise_move_no_edge(at: float, is_told: bool) -> None:
+    black, gain = 100.0, np.array([1.15, 1.0, 0.87])[COLOURS.ravel()]
+    seen = black + gain * (edge(at, 120, 800, 5) - black)
+    assert moved(seen.round().astype(np.uint16), edge(7.6, 120, 800), COLOURS) == is_told
 
 
 def test_without_an_edge_nothing_has_moved() -> None:

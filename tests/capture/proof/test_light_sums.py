@@ -22,10 +22,10 @@ Camera = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def summed(
-    code: float | list[float] = 1.0,
+    code: float | list[float] | list[NDArray[np.float64]] = 1.0,
     camera: Camera = lambda light: light,
     pairs: int = 6,
-    edges: float = 0.2,
+    edges: float | NDArray[np.float64] = 0.2,
     shot: float = 0.0,
     halo: float = 0.0,
     spread: tuple[float, float] = (0.6, 1.2),
@@ -93,6 +93,14 @@ def test_a_camera_whose_counts_are_not_proportional_to_light_is_told_by_edges_of
     assert gamma.curve == pytest.approx(0.35, abs=0.03)
     assert not gamma.is_uneven
     assert not found(1.3).is_curved
+
+
+def test_colours_that_a_camera_balances_otherwise_are_no_curve() -> None:
+    colour = np.arange(PIXELS) % 3
+    code = [np.array([1.15, 1.0, 0.87])[colour]] * 6
+    one = summed(code, edges=np.where(colour == 0, 0.5, 0.05))
+    assert one is not None
+    assert abs(one.curve) < 0.01
 
 
 def test_of_few_pairs_pixels_or_edges_nothing_is_said() -> None:

@@ -70,6 +70,7 @@ def code_sum(
     light = white - black
     noises = (noise.variance(ends[0]) + noise.variance(ends[1]))[lit.index]
     parts = {n: tuple(each[lit.index].astype(np.float32) for each in pair) for n, pair in pairs.items()}
+    colours = [lit.key % 3 == colour for colour in range(3)]
     together = np.sum([one + other for one, other in parts.values()], axis=0)
 
     shares: dict[int, float] = {}
@@ -85,9 +86,14 @@ def code_sum(
         if int(away.sum()) < FEWEST:
             continue
         shares[number] = _ratio(total[away], light[away])
+        # Colours that a camera balances otherwise are no curve: edges have other pixels of each.
+        usual = np.full(light.size, shares[number])
+        for own in colours:
+            if int((away & own).sum()) >= FEWEST:
+                usual[own] = _ratio(total[away & own], light[away & own])
         wanted = float(light[edge].sum(dtype=np.float64))
         if wanted > 0:
-            more = float(total[edge].sum(dtype=np.float64)) - shares[number] * wanted
+            more = float((total - usual * light)[edge].sum(dtype=np.float64))
             edges.append((more, wanted, 4 * float(noises[edge].sum())))
     if len(shares) < 3:
         return None
