@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from dsl_core.capture.proof.again.lit_again import LitAgain, lit_again
 from dsl_core.capture.proof.again.single_pixels import SinglePixels, single_pixels
 from dsl_core.capture.proof.code.code_colours import code_colours
 from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
+from dsl_core.capture.proof.code.first_light import flickers, light_of_pairs
 from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.ends import sentences_of_ends
@@ -92,8 +95,8 @@ class WholeScan:
                 known.raster,
                 with_colours,
             )
-        of_code = self._sharp_edges(), self._code_colours(), self._pair_places(), self._soft_stripes()
-        return [each for each in (of_code[0], *said, *of_code[1:]) if each]
+        said = [self._sharp_edges(), *said, self._flicker(), self._code_colours(), self._pair_places()]
+        return [each for each in (*said, self._soft_stripes()) if each]
 
     def _sharp_edges(self) -> str:
         known = self._known
@@ -101,6 +104,23 @@ class WholeScan:
         if known.lit is None or ends is None:
             return ""
         return sharp_edges(known.code_pairs(), ends, known.noise, known.raster)
+
+    def _flicker(self) -> str:
+        known = self._known
+        ends, whole = known.ends(known.first), self.code_sum()
+        # Values that are not proportional to the light give pairs with more edges more of it.
+        if known.lit is None or ends is None or (whole is not None and whole.is_curved):
+            return ""
+        lit = np.zeros(ends[0].shape, np.bool_)
+        lit[known.lit.index] = True
+        light = light_of_pairs(known.code_pairs(), ends, lit, known.noise)
+        if not flickers(light):
+            return ""
+        return (
+            f"The light flickers: pairs of the code have between {min(light.values()):.2f} and"
+            f" {max(light.values()):.2f} times the light of white, up and down. Expose for whole periods of"
+            " the mains and of the projector's LEDs, keep lamps of the room off, and scan again."
+        )
 
     def _code_colours(self) -> str:
         known = self._known

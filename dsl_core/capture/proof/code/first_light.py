@@ -27,6 +27,9 @@ from dsl_core.capture.proof.raster import Counts, Floats, Raster
 
 #: Light of a pair of pictures relative to the last ones from which on it is worth taking it again.
 SETTLED = 0.02
+#: Light of a lamp that warms up, or is switched, is on one side of its median, then on the other; it may come
+#: back. With more turns than this it flickers.
+MOST_TURNS = 2
 #: So many pairs of one light, other than that of all later ones, were no lamp that warms up.
 FEWEST_STEADY = 2
 #: Pixels that have to be lit to compare the light of two pictures.
@@ -113,16 +116,26 @@ def light_of_pairs(
     return {number: light(pair) / usual for number, pair in pairs.items()}
 
 
+def flickers(ratios: Mapping[int, float]) -> bool:
+    """Whether light goes up and down from pair to pair; ``ratios`` are those of `light_of_pairs`."""
+    if not ratios:
+        return False
+    light = np.array([ratios[number] for number in sorted(ratios)])
+    apart = light / np.median(light) - 1
+    sides = np.sign(apart[np.abs(apart) > SETTLED / 2])
+    return bool(np.abs(apart).max() > SETTLED) and int(np.count_nonzero(np.diff(sides))) > MOST_TURNS
+
+
 def unsettled_pairs(ratios: Mapping[int, float]) -> dict[int, float]:
     """Pairs whose light was not yet that of white and black, with the factor they have of it.
 
     ``ratios`` are those of `light_of_pairs`. None where the last pair differs as well: nothing has settled
-    then, or it is white and black that are wrong. Of light that changed at once only the pair that saw both:
-    taken again, the others would hide that nobody knows which light was as calibrated. Pairs beside those
-    that differ are taken again with them.
+    then, or it is white and black that are wrong. None of light that `flickers`, which it will do again. Of
+    light that changed at once only the pair that saw both: taken again, the others would hide that nobody
+    knows which light was as calibrated. Pairs beside those that differ are taken again with them.
     """
     found = {number: ratio for number, ratio in ratios.items() if abs(ratio - 1) > SETTLED}
-    if not found:
+    if not found or flickers(ratios):
         return {}
     in_order = sorted(ratios)
     alike = [abs(ratios[number] - ratios[in_order[0]]) < SETTLED / 2 for number in in_order]

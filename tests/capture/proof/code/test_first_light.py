@@ -9,6 +9,7 @@ from dsl_core.capture.proof.code.code_pairs import ALIKE
 from dsl_core.capture.proof.code.first_light import (
     _factor,
     changed_light,
+    flickers,
     has_moved,
     is_unlit,
     light_of_pairs,
@@ -168,6 +169,7 @@ def test_pairs_of_other_light_than_the_last_ones_have_not_settled(light: float, 
         ([0.9, 0.9, 0.9, 0.9, 0.95], {4: 0.95}),
         ([0.9, 1.0, 1.0, 1.0, 1.0], {0: 0.9, 1: 1.0}),
         ([0.85, 0.9, 0.93, 0.96, 1.0], {0: 0.85, 1: 0.9, 2: 0.93, 3: 0.96, 4: 1.0}),
+        ([0.97, 1.03, 0.98, 1.02, 1.0], {}),  # it flickers, and will do so again
         ([0.9, 0.9, 1.0, 0.9, 1.0], {0: 0.9, 1: 0.9, 2: 1.0, 3: 0.9, 4: 1.0}),
     ],
 )
@@ -179,6 +181,21 @@ def test_of_light_that_changed_at_once_only_the_pair_of_both_is_taken_again(
     pairs = {number: (each[2 * number % 4], each[2 * number % 4 + 1]) for number, each in enumerate(of_light)}
     found = unsettled_pairs(light_of_pairs(pairs, (white, black), np.ones(400, bool), NOISE))
     assert found == pytest.approx(again, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("light", "is_told"),
+    [
+        ([0.97, 1.03, 0.98, 1.02, 1.0], True),
+        ([0.94, 1.0, 0.95, 0.99, 0.97], True),  # white was bright
+        ([0.985, 1.015, 0.985, 1.015, 1.0], False),
+        ([0.9, 1.03, 0.995, 1.0, 1.0], False),  # a lamp that overshoots
+        ([1.0, 1.0, 0.9, 1.0, 1.0], False),
+        ([], False),
+    ],
+)
+def test_light_that_turns_again_and_again_flickers(light: list[float], is_told: bool) -> None:
+    assert flickers(dict(enumerate(light))) == is_told
 
 
 def test_the_light_of_first_pictures_is_read_from_why_they_were_taken_again() -> None:
