@@ -108,13 +108,14 @@ class WholeScan:
     def _flicker(self) -> str:
         known = self._known
         ends, whole = known.ends(known.first), self.code_sum()
-        # Values that are not proportional to the light give pairs with more edges more of it.
-        if known.lit is None or ends is None or (whole is not None and whole.is_curved):
+        if known.lit is None or ends is None or whole is None:
             return ""
         lit = np.zeros(ends[0].shape, np.bool_)
         lit[known.lit.index] = True
         light = light_of_pairs(known.code_pairs(), ends, lit, known.noise)
-        if not flickers(light):
+        # Values that are not proportional to the light give pairs with more edges more of it.
+        by_edges = 2 * abs(whole.curve)
+        if not flickers(light) or max(light.values()) - min(light.values()) < by_edges:
             return ""
         return (
             f"The light flickers: pairs of the code have between {min(light.values()):.2f} and"

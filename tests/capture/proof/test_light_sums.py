@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ Camera = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def summed(
-    code: float | list[float] | list[NDArray[np.float64]] = 1.0,
+    code: float | Sequence[float | NDArray[np.float64]] = 1.0,
     camera: Camera = lambda light: light,
     pairs: int = 6,
     edges: float | NDArray[np.float64] = 0.2,
@@ -38,7 +38,7 @@ def summed(
         return np.rint(camera(light) + BLACK + noise).clip(0).astype(np.uint16)
 
     light = WHITE * rng.uniform(*spread, PIXELS)
-    shares = code if isinstance(code, list) else [code] * pairs
+    shares = [code] * pairs if isinstance(code, float) else code
     taken: dict[int, Pair] = {}
     for number, share in enumerate(shares):
         part = np.where(rng.random(PIXELS) < edges, rng.uniform(0.3, 0.7, PIXELS), rng.random(PIXELS) > 0.5)
