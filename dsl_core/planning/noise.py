@@ -24,8 +24,9 @@ SATURATED = 0.98
 class Bracket:
     """Gains (ms at full drive), exposures and the sensor of a plan's settings; radiances are in DN per ms.
 
-    ``black`` is the radiance of the projector's black, which no level dims: what a black frame holds of it is
-    taken off, its shot noise is not. Next to the first orders of a dark setting it is most of the light.
+    ``black`` is the radiance of the projector's black and of the room, which no level dims: what a black
+    frame holds of it is taken off, its shot noise is not. Next to the first orders of a dark setting it is
+    most of the light.
     """
 
     gains_ms: tuple[float, ...]
@@ -47,19 +48,23 @@ class Bracket:
         dark = float(raw_variance(self.sensor, np.zeros(())))
         return dark + black_dn / self.sensor.electrons_per_dn
 
-    def information(self, radiance: Tensor, black: Tensor) -> Tensor:
-        """Inverse variance of each setting's own estimate, (settings, ...); zero where saturated."""
+    def information(self, radiance: Tensor, black: Tensor, true: Tensor | None = None) -> Tensor:
+        """Inverse variance of each setting's own estimate, (settings, ...); zero where saturated.
+
+        Raw values saturate, not what they are merged to: of noisy radiances, ``true`` ones say which do.
+        """
         limit = SATURATED * self.sensor.full_scale_dn - self.sensor.black_level_dn
         parts = []
         for gain, exposure_ms in zip(self.gains_ms, self.exposures_ms, strict=True):
             signal, black_dn = (radiance * gain).clip(min=0), black * exposure_ms
             variance = self._floor(black_dn) + signal / self.sensor.electrons_per_dn
-            parts.append((signal + black_dn < limit) * gain**2 / variance)
+            clean = signal if true is None else true * gain
+            parts.append((clean + black_dn < limit) * gain**2 / variance)
         return torch.stack(parts)
 
-    def variance(self, radiance: Tensor, black: Tensor) -> Tensor:
+    def variance(self, radiance: Tensor, black: Tensor, true: Tensor | None = None) -> Tensor:
         """Variance of the merged radiance, same shape; infinite where every setting is saturated."""
-        return 1 / self.information(radiance, black).sum(0)
+        return 1 / self.information(radiance, black, true).sum(0)
 
     def black_weights(self, radiance: Tensor, black: Tensor) -> Tensor:
         """How much a DN of each setting's black frame lowers the merged radiance, (settings, ...)."""

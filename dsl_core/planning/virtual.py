@@ -256,7 +256,7 @@ class VirtualPixels:
         black_noise = -(weights * common).sum(0)
         noisy = clean + rounding + noise + black_noise
         dark = self.bracket.variance(torch.zeros_like(black), black) * self.factors
-        variance = self.bracket.variance(noisy, black)
+        variance = self.bracket.variance(noisy, black, clean)
         offset = dark[..., 0]
         return Draw(
             nodes, first, zero, black, noisy, variance, saturated, black_noise, offset, rounding, random
@@ -279,7 +279,7 @@ class VirtualPixels:
         spread = self.bracket.variance(clean, black)
         sigma = torch.where(torch.isfinite(spread), spread, 0.0).sqrt()
         y = clean + draw.normal(clean.shape) * sigma
-        std = self.bracket.variance(y, black).sqrt()
+        std = self.bracket.variance(y, black, clean).sqrt()
         radiance, std = (v.reshape(-1, frames).T.contiguous() for v in (y, std))
         response, profiles = self.rig.projector_response, self.model.profiles
         if self.model.lines is not None:
