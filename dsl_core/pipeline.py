@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dsl_core.capture import metering
 from dsl_core.capture.again import Again
 from dsl_core.capture.preflight import fit_plan, require_possible
@@ -150,6 +152,7 @@ def reconstruct(
     from dsl_core.reconstruction.code_agreement import rows_apart_px
     from dsl_core.reconstruction.geometry_steps import GeometrySteps
     from dsl_core.reconstruction.light.early_ends import EarlyEnds
+    from dsl_core.reconstruction.light.mean_black import mean_black
     from dsl_core.reconstruction.light.own_sensor import own_sensor
     from dsl_core.reconstruction.rows.assembly import Assembly
     from dsl_core.reconstruction.rows.bands import bands_of
@@ -197,7 +200,9 @@ def reconstruct(
             result.put(band, spectra)
     with timer.stage("colour and result", in_parts=True):
         progress.report("colour and result", 0, 0)
-        return result.finish(solver, findings + list(ends.findings if ends is not None else ()))
+        findings += ends.findings if ends is not None else ()
+        seen = np.isfinite(geometry.depth_mm)
+        return result.finish(solver, findings, mean_black(source, rig.sensor, seen))
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:

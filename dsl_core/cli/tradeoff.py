@@ -67,6 +67,10 @@ def tradeoff(
         )
     chosen = choose(weighed, budget_s, error)
     _tell(output, pareto(weighed), chosen)
+    if view is None or view.black_dn_per_ms is None:
+        output.say(
+            "This is for a dark room: a scan made in the light of yours, as --look, tells what it costs."
+        )
     if report is not None:
         from dsl_core.planning.report import write_tradeoff_report
 

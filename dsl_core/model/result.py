@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SCHEMA_VERSION = 1
+#: Name of the attribute with the mean light of black frames in R, G and B, DN per ms, as a JSON list.
+BLACK_ATTRIBUTE = "black_dn_per_ms"
 
 
 class Flag(IntFlag):

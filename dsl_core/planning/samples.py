@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
-from dsl_core.model.result import SPECTRUM_INVALID
+from dsl_core.model.result import BLACK_ATTRIBUTE, SPECTRUM_INVALID
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import zero_order
@@ -39,7 +40,8 @@ class SamplePixels:
 
     Shading holds the camera's gain, as that of results does. ``lit_share`` is the share of the picture that
     the projector lights. ``spectra`` (samples, bands) at ``wavelengths_nm`` are what a quick look saw there,
-    None for reference reflectances.
+    None for reference reflectances. ``black_dn_per_ms`` is what its black frames hold on average in R, G and
+    B, light of the room included; None where nobody looked.
     """
 
     pixels: NDArray[np.int64]
@@ -49,6 +51,7 @@ class SamplePixels:
     lit_share: float
     spectra: Floats | None = None
     wavelengths_nm: Floats | None = None
+    black_dn_per_ms: tuple[float, ...] | None = None
 
     def part(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> SamplePixels:
         """Some of the samples, by a mask or by their numbers."""
@@ -86,7 +89,7 @@ def _of_plane(rig: Rig, depth_mm: float, pixels: NDArray[np.int64], lit_share: f
 
 
 def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:
-    """Some pixels of a quick look at a scene, with the depth, shading and spectrum found there.
+    """Some pixels of a quick look at a scene, with the depth, shading, spectrum and light of the room there.
 
     A look whose bands end far from those that plans are predicted for says nothing of the rest: references
     stand in for its spectra.
@@ -109,14 +112,23 @@ def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:
     pixels = _spread(valid, LOOK_GRID)
     depth = result["depth_mm"].values.ravel()[pixels].astype(np.float64)
     shade = result["shading"].values.ravel()[pixels].astype(np.float64)
-    found = SamplePixels(
-        pixels, depth, shade, _incidence(rig, _points(rig, pixels, depth)), float(valid.mean())
-    )
+    incidence = _incidence(rig, _points(rig, pixels, depth))
+    black = _black_of(result.attrs.get(BLACK_ATTRIBUTE))
+    found = SamplePixels(pixels, depth, shade, incidence, float(valid.mean()), black_dn_per_ms=black)
     nm, bands = result["wavelength_nm"].values.astype(np.float64), WavelengthGrid()
     if max(nm.min() - bands.start_nm, bands.stop_nm - nm.max()) > SHORT_NM:
         return found
     spectra = result["reflectance"].values.reshape(-1, valid.size)[:, pixels].T.astype(np.float64)
     return replace(found, spectra=spectra, wavelengths_nm=nm)
+
+
+def _black_of(told: object) -> tuple[float, ...] | None:
+    """The light of black frames as a result tells it; None where it does not, or in no numbers."""
+    try:
+        found = np.array(json.loads(str(told)), float)
+    except (ValueError, TypeError):
+        return None
+    return tuple(found.tolist()) if found.shape == (3,) and np.isfinite(found).all() else None
 
 
 def _inside(rig: Rig, depth_mm: float) -> tuple[NDArray[np.bool_], float]:

@@ -38,6 +38,7 @@ from dsl_core.planning.noise import (
     sideways_shares,
 )
 from dsl_core.planning.samples import SamplePixels
+from dsl_core.planning.tilt import tilt_std
 from dsl_core.reconstruction.columns.column import Column, refine
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
@@ -90,7 +91,7 @@ class Draw:
     """One draw of the noise of virtual pixels, as (samples, spectra, 3 colours, frames).
 
     ``nodes`` (samples, spectra, bands) are the true spectra, ``first`` and ``zero`` the signals without
-    noise, ``black`` (one frame) the projector's black light; ``noisy`` is what is read, with the stated
+    noise, ``black`` (one frame) the light of black frames; ``noisy`` is what is read, with the stated
     ``variance`` of its mosaic; ``black_noise`` is what the black frames' noise adds to it, whose variance,
     common to all frames, is ``offset_variance`` (samples, spectra, 3); ``rounding`` is what a coarse sensor
     adds to all pixels of equal light; more is drawn from ``random``.
@@ -240,8 +241,7 @@ class VirtualPixels:
     def _draw(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor) -> Draw:
         random = torch.Generator().manual_seed(0)
         nodes, clean = like(spectra, self.shading), first + zero
-        fraction = self.rig.projector_response.black_fraction
-        black = fraction * self._white(nodes, (0, *ORDERS))[..., None]
+        black = self._black(nodes)[..., None]
         rounding = torch.zeros(())
         spread = self.bracket.variance(clean, black) * self.factors
         if self.rig.sensor.rounds_light:
@@ -396,20 +396,15 @@ class VirtualPixels:
         lit: Tensor = ((direct > LIT_SIGMAS * noise) | ~torch.isfinite(noise)) & (refined | ~unsure)
         return lit
 
+    def _black(self, nodes: Tensor) -> Tensor:
+        """Signal of black frames: the projector's and what a look saw of the room, (samples, spectra, 3)."""
+        own = self.rig.projector_response.black_fraction * self._white(nodes, (0, *ORDERS))
+        if self.view.black_dn_per_ms is None:
+            return own
+        return own + (like(np.array(self.view.black_dn_per_ms), own) - own.mean((0, 1))).clip(min=0)
+
     def _white(self, nodes: Tensor, orders: tuple[int, ...]) -> Tensor:
         """Signal under white through some orders, (samples, spectra, 3), DN per ms."""
         moments = sum(self.bands.moments[order].sum(1) for order in orders)
         white = torch.einsum("cj,srj->src", like(np.asarray(moments), nodes), nodes)
         return white * self.shading[:, None, None]
-
-
-def tilt_std(depth_rel: Tensor, column_std_px: Tensor, fx_px: float, window_px: int) -> Tensor:
-    """Deviation of a surface's slope (tangent) from plane fits over a window, (samples, 1).
-
-    ``depth_rel`` (samples, spectra) are relative errors of depth; fits weigh pixels by the stated deviation
-    of their columns (samples, spectra), as `surface` does.
-    """
-    weight = column_std_px.double() ** -2
-    square = ((weight * depth_rel) ** 2).mean(1, keepdim=True) / weight.mean(1, keepdim=True) ** 2
-    found: Tensor = square.sqrt() * fx_px * (12 / (window_px * window_px - 1)) ** 0.5 / window_px
-    return found

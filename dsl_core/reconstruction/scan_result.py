@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +12,7 @@ from dsl_core.model.calibration.accepted import missed_attributes
 from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.result import SPECTRUM_INVALID, Flag
+from dsl_core.model.result import BLACK_ATTRIBUTE, SPECTRUM_INVALID, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.geometry import Geometry
@@ -79,9 +82,13 @@ def maps_without_spectra(rig: Rig, options: Options, geometry: Geometry) -> dict
     return {name: values[..., columns] for name, values in maps.items()}
 
 
-def attributes_of(rig: Rig, plan: CapturePlan, fit: Fit) -> dict[str, str | int | float]:
-    """What a result says of itself."""
+def attributes_of(
+    rig: Rig, plan: CapturePlan, fit: Fit, black_dn_per_ms: Sequence[float] = ()
+) -> dict[str, str | int | float]:
+    """What a result says of itself; of the light of black frames only where it is known."""
     attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
+    if black_dn_per_ms:
+        attributes[BLACK_ATTRIBUTE] = json.dumps([float(f"{value:.4g}") for value in black_dn_per_ms])
     return attributes | {ATTRIBUTE: fit.model_dump_json()} | missed_attributes(rig.calibrations)
 
 

@@ -17,6 +17,7 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.errors import PlanError, StoreError
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.model.rig import Rig
 from dsl_core.planning.choice import (
     LINES,
     Weighed,
@@ -30,7 +31,7 @@ from dsl_core.planning.choice import (
 from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
 from dsl_core.planning.expected import Prediction
 from dsl_core.planning.report import write_tradeoff_report
-from dsl_core.planning.samples import plane_samples
+from dsl_core.planning.samples import SamplePixels, plane_samples
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.front import front
 
@@ -154,6 +155,20 @@ def test_the_commands_write_no_plan_that_the_rig_refuses(
     assert main(designed) == 2
     assert "the camera supports 0.1 to 150 ms" in capsys.readouterr().err
     assert not (tmp_path / "set.json").exists()
+
+
+@pytest.mark.parametrize(("look", "told"), [([], True), (["--look", "seen.zarr"], False)])
+def test_a_prediction_without_the_room_says_so(
+    look: list[str], told: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def seen(rig: Rig, _: object) -> SamplePixels:
+        return replace(plane_samples(rig, grid=(3, 1)), black_dn_per_ms=(1.0, 1.0, 1.0))
+
+    monkeypatch.setattr("dsl_core.io.result.result_file.load_result", lambda _: "seen")
+    monkeypatch.setattr("dsl_core.planning.samples.scene_samples", seen)
+    monkeypatch.setattr("dsl_core.planning.choice.BRACKETS", (((2, 0.2), (8, 0.8)),))
+    assert main(["tradeoff", "--budget", "12s", "-O", "size=112x72", *look]) == 0
+    assert ("dark room" in capsys.readouterr().out) == told
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import FlatField, Rig
@@ -58,12 +59,9 @@ def test_samples_get_as_much_light_as_the_camera_s_lens_lets_through() -> None:
     assert found.shading == pytest.approx(even.shading * (0.2 + 0.4 * rows / 103 + 0.2 * columns / 159))
 
 
-@pytest.mark.parametrize(("bands", "its_own"), [(range(430, 661, 10), True), (range(450, 471, 2), False)])
-def test_spectra_of_a_look_stand_only_for_bands_that_it_has(bands: range, its_own: bool) -> None:
-    rig = published_rig()
-    rig = rig.model_copy(update={"camera": rig.camera.resized(16, 10)})
-    shape, nm = (10, 16), np.array(bands, float)
-    look = xr.Dataset(
+def look_of(nm: NDArray[np.float64], **attributes: str) -> xr.Dataset:
+    shape = (10, 16)
+    return xr.Dataset(
         {
             "depth_mm": (("y", "x"), np.full(shape, DEPTH_MM)),
             "shading": (("y", "x"), np.full(shape, 0.8)),
@@ -71,7 +69,35 @@ def test_spectra_of_a_look_stand_only_for_bands_that_it_has(bands: range, its_ow
             "reflectance": (("wavelength_nm", "y", "x"), np.full((len(nm), *shape), 0.3)),
         },
         coords={"wavelength_nm": nm},
+        attrs=attributes,
     )
-    found = scene_samples(rig, look)
+
+
+def small() -> Rig:
+    rig = published_rig()
+    return rig.model_copy(update={"camera": rig.camera.resized(16, 10)})
+
+
+@pytest.mark.parametrize(("bands", "its_own"), [(range(430, 661, 10), True), (range(450, 471, 2), False)])
+def test_spectra_of_a_look_stand_only_for_bands_that_it_has(bands: range, its_own: bool) -> None:
+    found = scene_samples(small(), look_of(np.array(bands, float)))
     assert found.depth_mm == pytest.approx(DEPTH_MM)
     assert (found.spectra is not None) == its_own
+
+
+@pytest.mark.parametrize(
+    ("told", "wanted"),
+    [
+        ("[0.5, 1, 2]", (0.5, 1.0, 2.0)),
+        ("[0.5, 1]", None),
+        ("[0.5, 1, NaN]", None),
+        ("[[1], 2, 3]", None),
+        ("bright", None),
+    ],
+)
+def test_a_look_tells_how_bright_its_room_is(told: str, wanted: tuple[float, ...] | None) -> None:
+    nm = np.arange(430.0, 661.0, 10.0)
+    found = scene_samples(small(), look_of(nm, black_dn_per_ms=told))
+    assert found.black_dn_per_ms == wanted
+    assert found.part(np.array([0])).black_dn_per_ms == wanted
+    assert scene_samples(small(), look_of(nm)).black_dn_per_ms is None

@@ -15,7 +15,8 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane, plane_shading
 from dsl_core.planning.samples import _of_plane
-from dsl_core.planning.virtual import Draw, VirtualPixels, tilt_std
+from dsl_core.planning.tilt import tilt_std
+from dsl_core.planning.virtual import Draw, VirtualPixels
 from dsl_core.reconstruction.columns.column import Column
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig

@@ -95,8 +95,16 @@ class Assembly:
         note = {"counts": asdict(counts), "poor": packed(self.poor[place])}
         self._sink.put(place, wanted, json.dumps(note))
 
-    def finish(self, solver: RowSolver | None, findings: Iterable[FitFinding]) -> xr.Dataset:
-        """The whole result, with the verdict on it; ``findings`` are those that were made on the way."""
+    def finish(
+        self,
+        solver: RowSolver | None,
+        findings: Iterable[FitFinding],
+        black_dn_per_ms: Sequence[float] = (),
+    ) -> xr.Dataset:
+        """The whole result, with the verdict on it.
+
+        ``findings`` are those that were made on the way; ``black_dn_per_ms`` is what `mean_black` found.
+        """
         geometry = self._geometry
         fit = fit_of(
             self._rig,
@@ -111,7 +119,7 @@ class Assembly:
             with_known_causes([*findings, *(() if solver is None else solver.findings)]),
         )
         fit = fit.model_copy(update={"measured": traits_in_words(self._rig)})
-        return self._sink.finish(attributes_of(self._rig, self._plan, fit))
+        return self._sink.finish(attributes_of(self._rig, self._plan, fit, black_dn_per_ms))
 
     def _place(self, band: Band) -> slice:
         """Rows of a band in the result."""
