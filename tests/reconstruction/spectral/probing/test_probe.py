@@ -251,6 +251,25 @@ def test_the_usual_fit_is_that_of_pixels_in_even_light() -> None:
         assert few_even.usual_chi_square == 30.0
 
 
+def test_what_columns_explain_is_no_misfit_of_the_model() -> None:
+    count = probe_module.FEWEST
+    known = {"chi_square": np.full(count, 1.7), "pixel": np.arange(count)}
+    assert probe_of(**known, by_columns=np.full(count, 0.5)).usual_chi_square == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize(("std_px", "share"), [(10.0, 1.0), (0.25, 0.5), (0.0, 0.0)])
+def test_columns_explain_as_much_as_they_are_unsure(std_px: float, share: float) -> None:
+    # Light that is displaced in both orders, of a weight by which a column is known to 0.25.
+    changes = torch.zeros((1, 4, len(PARAMETERS)), dtype=torch.float64)
+    changes[0, :2, 0], changes[0, 2:, 1] = torch.tensor([1.0, -1.0]), torch.tensor([-1.0, 1.0])
+    weight, shift_px = torch.full((1, 4), 4.0, dtype=torch.float64), 0.3
+    displaced = (changes[..., 0] + changes[..., 1]) * shift_px
+    other = torch.tensor([[0.7, 0.7, 0.7, 0.7]], dtype=torch.float64)
+    solved: Any = SimpleNamespace(light=SimpleNamespace(weight=weight), residual=displaced + other)
+    found = probe_module.explained_by_columns(solved, changes, np.array([std_px], np.float32))
+    assert found.tolist() == pytest.approx([share * float((weight * displaced**2).sum())], rel=1e-3, abs=1e-6)
+
+
 def test_light_is_uneven_by_neighbours_of_the_same_colour() -> None:
     # A mosaic whose colours differ, with an edge between columns 5 and 6, and one pixel without light.
     light = np.tile(np.array([[1.0, 3.0], [3.0, 2.0]], np.float32), (5, 6))
