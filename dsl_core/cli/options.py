@@ -78,7 +78,7 @@ CalibrationName = Annotated[
     str | None,
     typer.Option(
         "--calibration",
-        help="A calibration: its name in the library, NAME@DATE, a rig's file, or a campaign.",
+        help="A calibration: its library name, NAME@DATE, a rig's file or a campaign.",
         autocompletion=tab_calibrations,
     ),
 ]

@@ -12,6 +12,10 @@ PHRASES = (
         "If you mean that rig, connect it on the Rig page.",
     ),
     ("Name it with --rig and --option.", "Connect its rig on the Rig page."),
+    (
+        "To continue it, name its rig with --rig, and with --option and --set what it was begun with.",
+        "To continue it, connect its rig first, and then open it again.",
+    ),
     ("Leave out --rig and --option, or begin", "Connect that rig, or begin"),
     ("Name one with --calibration FILE.", "Choose one."),
     ("Name one with --calibration to reconstruct depth.", "Choose one to reconstruct depth."),

@@ -137,10 +137,14 @@ def test_a_scan_that_is_opened_brings_another_plan_than_the_file(
         bench.scans.start()
     bench.scans.plan_new_scan()
     saved_comb(bench, tmp_path)
+    own = bench.state.plan.value
     assert bench.scans.open(tmp_path / "first.dsl")
-    bench.scans.plan_new_scan()
     assert bench.state.preset is PRESETS[0]
     assert "--plan" not in bench.scans.command_line()
+    # The plan from the file is that of the next scan again.
+    bench.scans.plan_new_scan()
+    assert bench.state.plan.value == own
+    assert "--plan" in bench.scans.command_line()
 
 
 def test_a_plan_that_is_fitted_to_another_rig_is_no_longer_the_file(bench: ScanBench, tmp_path: Path) -> None:
