@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 
-from dsl_app.shared.paths import expanded
 from dsl_app.shared.widgets.inside import apply_theme_inside
 from dsl_app.shell.main_window import MainWindow
 
@@ -36,7 +35,7 @@ class CapturesAction:
             self._dialog.raise_()
             return self._dialog
         window = self._window
-        state = CapturesState(Path(window.parts.settings.output_folder or expanded(Path("~")) / "dsl-scans"))
+        state = CapturesState(window.parts.settings.scans)
         state.done.connect(self._show)
         control = CapturesController(state, window.parts.runner)
         self._dialog = dialog = CapturesDialog(state, control, window)

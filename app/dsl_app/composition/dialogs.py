@@ -11,7 +11,6 @@ from PySide6.QtCore import Qt
 
 from dsl_app.composition.captures import CapturesAction
 from dsl_app.shared.known_files import has_pictures
-from dsl_app.shared.paths import expanded
 from dsl_app.shared.widgets.inside import apply_theme_inside
 from dsl_app.shared.widgets.open_dialog import ALL, SCANS, OpenDialog
 from dsl_app.shell.main_window import MainWindow
@@ -66,7 +65,7 @@ class ImportAction:
 
     @property
     def _home(self) -> Path:
-        return Path(self._window.parts.settings.output_folder or expanded(Path("~")) / "dsl-scans")
+        return self._window.parts.settings.scans
 
     def _ask(self) -> None:
         from dsl_app.importing.dialog import ImportDialog

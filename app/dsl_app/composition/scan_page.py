@@ -20,7 +20,6 @@ from dsl_app.scan.page import ScanPage
 from dsl_app.scan.reconstruction_time import Pace
 from dsl_app.scan.state import Phase, ScanState
 from dsl_app.shared.evented import Value
-from dsl_app.shared.paths import expanded
 from dsl_app.shared.settings import data_folder, demo_folder
 from dsl_app.shell.main_window import MainWindow
 from dsl_core.model.plan import CapturePlan, Sentinels
@@ -46,7 +45,7 @@ class ScanPageMaker:
     def make(self) -> tuple[ScanPage, ScanController]:
         """The page and its controller."""
         window, parts, rig = self.window, self.window.parts, self.rig
-        folder = Path(parts.settings.output_folder or expanded(Path("~")) / "dsl-scans")
+        folder = parts.settings.scans
         state = ScanState(CapturePlan(sentinels=Sentinels()), fresh_target(folder, datetime.now()))
         self._follow(state)
         controller = ScanController(

@@ -18,7 +18,7 @@ from dsl_app.composition.rig_profiles import ProfileAction
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.evented import Value
 from dsl_app.shared.known_files import Kind
-from dsl_app.shared.paths import expanded, is_dir
+from dsl_app.shared.paths import is_dir
 from dsl_app.shared.settings import demo_folder
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.application import make_window, open_first_page
@@ -259,7 +259,7 @@ class Composition(QObject):
     def _scan_folders(self) -> list[Path]:
         """Where scans are saved, and where recent files are."""
         settings = self.window.parts.settings
-        own = Path(settings.output_folder or expanded(Path("~")) / "dsl-scans")
+        own = settings.scans
         return [own, *(Path(each).parent for each in settings.recent)]
 
     def _start_live(self) -> None:
@@ -318,7 +318,7 @@ class Composition(QObject):
                 window.save_early()
 
         state.campaign.changed.connect(remember)
-        home = Path(settings.campaigns_folder or expanded(Path("~")) / "dsl-campaigns")
+        home = settings.campaigns
         page = CalibratePage(state, self.rig.state, control, home)
         page.scan_requested.connect(lambda: window.open_page("scan"))
         return page

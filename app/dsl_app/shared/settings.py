@@ -47,6 +47,16 @@ class Settings(BaseModel):
     #: How many times as long as expected the last reconstruction took on this computer.
     reconstruction_pace: float = Field(default=1.0, gt=0.0)
 
+    @property
+    def scans(self) -> Path:
+        """Folder that new scans are saved in: the one that was chosen, or one in the home folder."""
+        return Path(self.output_folder or expanded(Path("~")) / "dsl-scans")
+
+    @property
+    def campaigns(self) -> Path:
+        """Folder that new campaigns are begun in, likewise."""
+        return Path(self.campaigns_folder or expanded(Path("~")) / "dsl-campaigns")
+
     def remember(self, path: Path) -> None:
         """Put a file first among the recent ones."""
         name = str(path.absolute())
