@@ -271,7 +271,6 @@ def _sideways(scan: ProbedScan, column_px: Tensor, traced: dict[int, tuple[Tenso
 
 def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
     shape, solved = scan.pixels.valid.shape, solve_pixels(scan, targets)
-    samples, _ = samples_of(targets, shape, scan.model.rig.sensor.bayer)
     light, weight, count = solved.light, solved.light.weight, len(targets)
 
     def of_curves(values: Tensor) -> Tensor:
@@ -294,6 +293,7 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
     pull = (solved.nodes - scan.prior.level) * solved.free / scan.prior.level_std**2
     score = score - (bias.mT @ pull[..., None])[..., 0]
     reported = scan.model.bands.reported
+    by_columns = explained_by_columns(solved, changes, scan.pixels.column_std_px.ravel()[solved.samples])
     y, x = np.divmod(targets, shape[1])
     return {
         "normal": normal.numpy(),
@@ -302,10 +302,7 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
         "reflectance": solved.mean[reported].T.numpy(),
         "chi_square": solved.chi_square.numpy(),
         "freedom": solved.freedom.numpy(),
-        "by_columns": (
-            solved.gather(explained_by_columns(solved, changes, scan.pixels.column_std_px.ravel()[samples]))
-            / solved.freedom
-        ).numpy(),
+        "by_columns": (solved.gather(by_columns) / solved.freedom).numpy(),
         "correlation": _correlation(
             torch.split(solved.residual * weight.sqrt(), light.sizes, 1), solved.gather
         ).numpy(),

@@ -20,13 +20,14 @@ from dsl_core.solve import banded
 class SolvedPixels:
     """Probed pixels (n,) and their spectra, found by the samples (m,) of each, whose values are (m, k).
 
-    ``owner`` (m,) is the pixel of a sample, ``shading`` (m,) its shading, ``rows`` (m, bands, k) the model
-    for that and ``heavy`` the same, weighted; ``residual`` (m, k) is what spectra leave. ``nodes`` (n, bands)
-    and ``mean`` (bands, n) are the spectra, ``information`` (n, bands, bands) what is known of them, with the
-    prior; ``free`` (n, bands) are bands that are not held at a bound.
+    ``samples`` (m,) are their flat indices, ``owner`` (m,) the pixel of each, ``shading`` (m,) its shading,
+    ``rows`` (m, bands, k) the model for that and ``heavy`` the same, weighted; ``residual`` (m, k) is what
+    spectra leave. ``nodes`` (n, bands) and ``mean`` (bands, n) are the spectra, ``information`` (n, bands,
+    bands) what is known of them, with the prior; ``free`` (n, bands) are bands that are not held at a bound.
     """
 
     light: ProbedLight | PatternLight
+    samples: Indices
     owner: Tensor
     shading: Tensor
     rows: Tensor
@@ -84,4 +85,7 @@ def solve_pixels(scan: ProbedScan, targets: Indices) -> SolvedPixels:
     prior = prior + torch.eye(nodes.shape[1]).to(matrix) * scan.prior.level_std**-2
     residual = light.values - (nodes[owners][:, None] @ rows)[:, 0]
     free = ~found.at_bound.T
-    return SolvedPixels(light, owners, lit, rows, heavy, residual, nodes, found.mean, matrix + prior, free)
+    information = matrix + prior
+    return SolvedPixels(
+        light, samples, owners, lit, rows, heavy, residual, nodes, found.mean, information, free
+    )  # fmt: skip

@@ -110,10 +110,11 @@ def test_chi_square_is_per_degree_of_freedom_beyond_those_of_a_spectrum() -> Non
     owner, one = torch.tensor([0, 0, 1]), torch.ones(3, dtype=torch.float64)
     residual = torch.full((3, 40), 2.0, dtype=torch.float64)
     nodes = torch.zeros((2, 5), dtype=torch.float64)
-    solved = SolvedPixels(light, owner, one, one, one, residual, nodes, nodes.T, nodes, nodes == 0)
+    at = np.arange(len(owner))
+    solved = SolvedPixels(light, at, owner, one, one, one, residual, nodes, nodes.T, nodes, nodes == 0)
     assert solved.chi_square.tolist() == pytest.approx([4 * 80 / 55, 4 * 35 / (35 - 35 / 3)])
     few: Any = SimpleNamespace(weight=weight * (torch.arange(40) < 5))
-    again = SolvedPixels(few, owner, one, one, one, residual, nodes, nodes.T, nodes, nodes == 0)
+    again = SolvedPixels(few, at, owner, one, one, one, residual, nodes, nodes.T, nodes, nodes == 0)
     assert float(again.chi_square[1]) == pytest.approx(4 * 5 / (5 - 5 / 3))
 
 
@@ -123,7 +124,7 @@ def test_nodes_at_a_bound_do_not_give_way_to_what_data_ask() -> None:
     free = torch.tensor([[True, False, True, True], [True, True, True, True]])
     none: Any = None
     nodes = torch.zeros((2, 4), dtype=torch.float64)
-    solved = SolvedPixels(none, none, none, none, none, none, nodes, nodes.T, rows.mT @ rows, free)
+    solved = SolvedPixels(none, none, none, none, none, none, none, nodes, nodes.T, rows.mT @ rows, free)
     found = solved.give_way(rows.mT @ change)[..., 0].numpy()
     for pixel in range(2):
         some = free[pixel].numpy()
