@@ -7,7 +7,7 @@ import importlib.util
 import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING, Any, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
 from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.errors import CalibrationError
@@ -75,7 +75,7 @@ def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
         for key, value in values.items():
             if key in lists:
                 values[key] = value if isinstance(value, list) else [value] if value != "" else []
-            elif types[key] is float and re.fullmatch(r"-?\d+,\d+", given[key]):
+            elif float in (types[key], *get_args(types[key])) and re.fullmatch(r"-?\d+,\d+", given[key]):
                 raise CalibrationError(
                     f"A setting of {name} is wrong: {key} must be a number with a decimal point, such as"
                     f" {given[key].replace(',', '.')} (given {given[key]})."

@@ -100,6 +100,7 @@ def test_a_setting_is_taken_back_by_none(name: str, key: str, text: str) -> None
     assert load_recipe(name, {key: text}) == load_recipe(name)
 
 
-def test_a_decimal_comma_is_told_as_one() -> None:
+@pytest.mark.parametrize(("name", "key"), [("spectralon", "reflectance"), ("bandpass", "reflectance")])
+def test_a_decimal_comma_is_told_as_one(name: str, key: str) -> None:
     with pytest.raises(CalibrationError, match=r"a decimal point, such as 0\.99 \(given 0,99\)"):
-        load_recipe("spectralon", {"reflectance": "0,99"})
+        load_recipe(name, {key: "0,99"})
