@@ -78,23 +78,3 @@ def _blocks(values: Floats) -> Iterator[Floats]:
             found = block[np.isfinite(block)]
             if found.size:
                 yield found
-
-
-def in_places(value: float, std: float | None, form: str) -> tuple[str, str]:
-    """A value and its deviation in words, to as many places as two digits of the deviation need.
-
-    ``form``, such as ``+.3f``, says the fewest places of both. The deviation is empty where there is none.
-    """
-    if std is None:
-        return format(value, form), ""
-    if std > 0:
-        sign, fewest = form.removesuffix("f").split(".")
-        needed = min(1 - math.floor(math.log10(std)), 8)
-        form = f"{sign}.{max(int(fewest), needed)}f"
-    return format(value, form), format(std, form.removeprefix("+"))
-
-
-def with_std(value: float, std: float | None, form: str) -> str:
-    """A value with its deviation as `in_places` words them; the value alone where there is none."""
-    shown, spread = in_places(value, std, form)
-    return f"{shown} ± {spread}" if spread else shown

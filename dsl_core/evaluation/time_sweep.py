@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.difference import ResultDifference
-from dsl_core.evaluation.scatter import with_std
 from dsl_core.evaluation.summary import Evaluation
+from dsl_core.model.figure import with_std_in_places
 from dsl_core.solve.front import front
 
 
@@ -58,7 +58,7 @@ class SweepPoint:
         error, std = self.error(figure), self.std(figure)
         if error is None:
             return "–"
-        return with_std(error, std, figure.form)
+        return with_std_in_places(error, std, figure.form)
 
 
 def point_against_truth(name: str, seconds: float, found: Evaluation) -> SweepPoint:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from dsl_core.evaluation.scatter import in_places
 from dsl_core.evaluation.summary import Evaluation
+from dsl_core.model.figure import in_places
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dsl_core.model.figure import Figure, failures
+from dsl_core.model.figure import Figure, failures, with_std_in_places
 
 
 @pytest.mark.parametrize(
@@ -66,3 +66,14 @@ def test_digits_follow_the_deviation(figure: Figure, text: str) -> None:
 def test_failures_are_the_figures_outside_their_limits() -> None:
     good, bad = (Figure(name="x", value=value, unit="", high=1) for value in (0, 2))
     assert failures((good, bad, good)) == (bad,)
+
+
+def test_two_digits_of_a_deviation_are_shown() -> None:
+    assert with_std_in_places(2.4363, 0.0571, ".3f") == "2.436 ± 0.057"
+    assert with_std_in_places(0.15013, 0.00029, ".3f") == "0.15013 ± 0.00029"
+    assert with_std_in_places(-0.041, 12.0, "+.3f") == "-0.041 ± 12.000"
+    assert (with_std_in_places(0.5, None, ".4f"), with_std_in_places(0.5, 0.0, ".1f")) == (
+        "0.5000",
+        "0.5 ± 0.0",
+    )
+    assert with_std_in_places(0.5, float("nan"), ".1f") == "0.5 ± unknown"

@@ -11,10 +11,10 @@ import numpy as np
 
 from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import ReportPicture, figure_uri, value_picture
-from dsl_core.evaluation.scatter import with_std
 from dsl_core.evaluation.seen_target import SeenTarget
 from dsl_core.evaluation.stage_test import StageLine, StageTest, stage_table
 from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint, best_points
+from dsl_core.model.figure import with_std_in_places
 from dsl_core.solve.normal import BAND_95
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def _stage_plot(found: StageTest, axes: Axes) -> None:
 
 
 def _rms(line: StageLine) -> str:
-    return f"{with_std(line.rms_mm, line.rms_std_mm, '.4f')} mm"
+    return f"{with_std_in_places(line.rms_mm, line.rms_std_mm, '.4f')} mm"
 
 
 def _sweep_plot(points: Sequence[SweepPoint], shown: SweepFigure, axes: Axes) -> None:

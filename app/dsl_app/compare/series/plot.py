@@ -17,9 +17,9 @@ from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import CalmPlot, ticks
-from dsl_core.evaluation.scatter import with_std
 from dsl_core.evaluation.stage_test import StageLine, StageTest
 from dsl_core.evaluation.time_sweep import SweepPoint, best_points
+from dsl_core.model.figure import with_std_in_places
 from dsl_core.solve.normal import BAND_95
 
 #: Room around points, as a share of their range, and at least so many decades.
@@ -149,7 +149,7 @@ def _key(sign: str, colour: str) -> str:
 
 def _straight(line: StageLine) -> str:
     rms, worst = (
-        with_std(value, std, ".4f")
+        with_std_in_places(value, std, ".4f")
         for value, std in ((line.rms_mm, line.rms_std_mm), (line.worst_mm, line.worst_std_mm))
     )
     return f"RMS {rms} mm, worst {worst} mm"
