@@ -118,6 +118,12 @@ class CodeWave:
         """What columns are off by, rms; 0 where that is little or chance explains it."""
         return self.rms_px if matters(self.rms_px, self.rms_std_px, MOST_WAVE_PX) else 0.0
 
+    def beyond(self, whole: CodeWave) -> CodeWave:
+        """The wave of a part less that of the whole, at the boundaries that both know."""
+        # What another shape of lines does is in both.
+        own, of_whole = (np.isin(a.off_px, b.off_px) for a, b in ((self, whole), (whole, self)))
+        return CodeWave(self.off_px[own], self.away_px[own] - whole.away_px[of_whole], self.std_px[own])
+
     def own_width(self, doubt: SpreadDoubt) -> OwnWidth:
         """The width that explains the wave best, with what was known of it."""
         moved = (doubt.moved_at(self.off_px) - doubt.moved_at(-self.off_px)) / 2
@@ -185,32 +191,63 @@ def _known_share(named_px: NDArray[np.integer], known: NDArray[np.bool_], step_p
 
 
 def with_varying_width(
-    doubt: SpreadDoubt, lines: LineSet | None, named_px: NDArray[np.integer], maps: ColumnMaps
+    doubt: SpreadDoubt,
+    lines: LineSet | None,
+    named_px: NDArray[np.integer],
+    maps: ColumnMaps,
+    colours: NDArray[np.integer],
 ) -> SpreadDoubt:
-    """A doubt that holds by how much the width in each part of the picture differs, if that matters.
+    """A doubt that holds by how much widths in parts of the picture, and of its colours, differ.
 
-    One width for all is off in most places of a lens that blurs its corners, and waves of opposite signs
-    cancel in the whole picture. Other arguments are those of `code_wave`.
+    One width for all is off in most places of a lens that blurs its corners, and in a colour that it blurs
+    more; waves of opposite signs cancel in the whole picture. ``colours``, of as many pixels, are those that
+    pixels measure. Other arguments are those of `code_wave`. The same doubt where little differs.
     """
+    whole = code_wave(lines, named_px, maps)
+    if whole is None:
+        return doubt
     row, column = (np.arange(size) * parts // size for size, parts in zip(named_px.shape, PARTS, strict=True))
-    part = (row[:, None] * PARTS[1] + column).ravel()
+    by_place, by_colour = (
+        _off_by_kind(kind, whole, doubt, lines, named_px.ravel(), maps)
+        for kind in ((row[:, None] * PARTS[1] + column).ravel(), colours.ravel())
+    )
+    if by_place is None and by_colour is None:
+        return doubt
+    squares = np.zeros(named_px.size)
+    if by_place is not None:
+        # A place that says less than all together is as far off as usual: widths differ inside of it, too.
+        squares += np.maximum(by_place**2, np.mean(by_place**2))
+    if by_colour is not None:
+        squares += by_colour**2
+    return replace(doubt, varies=np.sqrt(squares))
+
+
+def _off_by_kind(
+    kind: NDArray[np.integer],
+    whole: CodeWave,
+    doubt: SpreadDoubt,
+    lines: LineSet | None,
+    named_px: NDArray[np.integer],
+    maps: ColumnMaps,
+) -> Floats | None:
+    """What the width of each pixel is off by, (pixels,), relative to the one for all, by its ``kind``.
+
+    Kinds that do not tell are as far off as others. None where all of this is little, or chance.
+    """
     waves = [
-        code_wave(lines, named_px.ravel()[part == each], maps.of(part == each))
-        for each in range(PARTS[0] * PARTS[1])
+        code_wave(lines, named_px[kind == each], maps.of(kind == each)) for each in range(kind.max() + 1)
     ]
     free = replace(doubt, relative=1.0)
-    widths = {each: wave.own_width(free) for each, wave in enumerate(waves) if wave is not None}
-    if len(widths) < 2:
-        return doubt
-    wider, std = (np.array([getattr(each, name) for each in widths.values()]) for name in ("wider", "std"))
-    off = wider - np.average(wider, weights=std**-2)
+    own = {n: wave.beyond(whole).own_width(free) for n, wave in enumerate(waves) if wave is not None}
+    if len(own) < 2:
+        return None
+    off, std = np.array([(width.wider, width.noise) for width in own.values()]).T
     varies, varies_std = rms_beyond_chance(off, std)
     if not matters(varies, varies_std, MOST_WIDER):
-        return doubt
-    # A part that says more than all together is off by what it says; the others may be as far off as usual.
-    of_part = np.full(len(waves), varies)
-    of_part[list(widths)] = np.maximum(np.abs(off), varies)
-    return replace(doubt, varies=of_part[part])
+        return None
+    of_kind = np.full(len(waves), varies)
+    of_kind[list(own)] = off
+    return np.asarray(of_kind[kind])
 
 
 def _mirrored(lines: LineSet) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

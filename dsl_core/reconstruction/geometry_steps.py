@@ -11,6 +11,7 @@ from dsl_core.model.fit import FitFinding
 from dsl_core.model.options import Options
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spread.fit import SpreadFit
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
@@ -147,7 +148,8 @@ class GeometrySteps:
                 error = _error_of(smooth_peaks(self.rig, lines, code, white, self._frames))
                 columns = self._columns(code, white, replace(known, error=error))
                 wave = code_wave(lines, named.column, columns.maps)
-            doubt = with_varying_width(doubt, lines, named.column, columns.maps)
+            colours = bayer_channels(self.rig.sensor.bayer, *named.column.shape)
+            doubt = with_varying_width(doubt, lines, named.column, columns.maps, colours)
         if wave is not None:
             self.findings.append(wave.finding())
         wave_px = 0.0 if wave is None else wave.error_px

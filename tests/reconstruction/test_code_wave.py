@@ -14,6 +14,7 @@ from dsl_core import pipeline
 from dsl_core.model.options import Options
 from dsl_core.model.presets import preset_plan
 from dsl_core.optics.lines.line_set import LineSet
+from dsl_core.optics.sensor import bayer_channels
 from dsl_core.reconstruction.code_wave import CodeWave, OwnWidth, code_wave, with_varying_width
 from dsl_core.reconstruction.columns.maps import ColumnMaps
 from dsl_core.reconstruction.columns.spread_doubt import PLACES, SpreadDoubt
@@ -151,9 +152,9 @@ def test_widths_that_differ_over_the_picture_are_doubted() -> None:
     sine = np.sin(2 * math.pi / LINES.step_px * (true_px - LINES.first_px))
     wider = np.linspace(0.15, -0.15, 150)
     named = np.round(true_px).astype(np.int32)
-    before = doubt_of(0.01)
+    before, one_colour = doubt_of(0.01), np.ones(true_px.size, np.int64)
     varied, even = (
-        with_varying_width(before, LINES, named, maps_of((true_px - each * sine).ravel()))
+        with_varying_width(before, LINES, named, maps_of((true_px - each * sine).ravel()), one_colour)
         for each in (wider, 0.1)
     )
     # The means of three parts are .1, 0 and -.1; the middle is doubted as much as usual.
@@ -165,8 +166,23 @@ def test_widths_that_differ_over_the_picture_are_doubted() -> None:
     of_pixels = varied.at(np.full(true_px.size, middle)).reshape(true_px.shape)
     assert of_pixels[0, 10] > 8 * before.at(np.array([middle]))[0]
     assert even is before
-    unknown = with_varying_width(before, LINES, np.full_like(named, -1), maps_of(true_px.ravel()))
+    unknown = with_varying_width(before, LINES, np.full_like(named, -1), maps_of(true_px.ravel()), one_colour)
     assert unknown is before
+
+
+def test_lines_that_are_wider_in_one_colour_are_doubted_there() -> None:
+    rng = np.random.default_rng(7)
+    true_px = rng.uniform(3, 190, (60, 150))
+    sine = np.sin(2 * math.pi / LINES.step_px * (true_px - LINES.first_px))
+    colours = bayer_channels("RGGB", *true_px.shape)
+    named = np.round(true_px).astype(np.int32)
+    before = doubt_of(0.01)
+    wider = np.where(colours == 0, 0.24, 0.0)
+    varied = with_varying_width(before, LINES, named, maps_of((true_px - wider * sine).ravel()), colours)
+    assert varied.varies is not None
+    # Relative to all pixels, of which a quarter are red.
+    of_colours = [np.unique(varied.varies[colours.ravel() == colour]) for colour in range(3)]
+    assert np.abs(np.concatenate(of_colours)) == pytest.approx([0.18, 0.06, 0.06], abs=0.02)
 
 
 @pytest.mark.slow
