@@ -181,7 +181,7 @@ def _depth(result: xr.Dataset, truth: Truth) -> tuple[DepthScore | None, Honesty
     score = depth_score(measured, truth.depth_mm, truth.lit)
     if "depth_std_mm" not in result:
         return score, None
-    return score, check_honesty(measured, truth.depth_mm, result["depth_std_mm"].values, truth.lit)
+    return score, _honesty(measured, truth.depth_mm, result["depth_std_mm"].values, truth.lit)
 
 
 def interior(material: NDArray[np.int32], margin_px: int = _MARGIN_PX) -> NDArray[np.bool_]:
@@ -277,4 +277,14 @@ def _spectral_calibration(samples: list[_Sample]) -> HonestyCheck | None:
     std = np.concatenate([sample.std for sample in known if sample.std is not None], axis=1)
     shares = [sample.share for sample in known if sample.share is not None]
     decided = np.concatenate(shares, axis=1) >= DECIDED_FROM if len(shares) == len(known) else None
-    return check_honesty(values, truth, std, decided)
+    return _honesty(values, truth, std, decided)
+
+
+def _honesty(
+    values: Floats, truth: Floats, std: Floats, counted: NDArray[np.bool_] | None
+) -> HonestyCheck | None:
+    """What `check_honesty` finds; None where nothing can be compared."""
+    try:
+        return check_honesty(values, truth, std, counted)
+    except DecodeError:
+        return None

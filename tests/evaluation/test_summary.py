@@ -63,6 +63,15 @@ def test_calibration_counts_only_bands_that_data_decide(known: Any) -> None:
     assert everything.coverage_95 == pytest.approx(0.95 * 42 / 47, abs=0.01)
 
 
+def test_uncertainties_that_nothing_can_be_held_against_leave_the_rest_judged(known: Any) -> None:
+    known.result["data_share"].values[:] = 0.0
+    known.result["depth_std_mm"].values[:] = np.nan
+    found = evaluate(known.result, known.truth)
+    assert (found.depth_calibration, found.spectral_calibration) == (None, None)
+    assert found.depth is not None
+    assert len(found.patches) == 2
+
+
 def test_targets_choose_the_materials(known: Any) -> None:
     assert [p.name for p in evaluate(known.result, replace(known.truth, targets=(0,))).patches] == ["ramp"]
 
