@@ -100,7 +100,9 @@ def _of_coverage(
 ) -> Iterator[FitFinding]:
     """Lit pixels without a depth."""
     lit, measured = int(np.count_nonzero(is_lit)), int(np.count_nonzero(is_measured))
-    too_bright = int(np.count_nonzero(is_lit & ~is_measured & ((flags & int(Flag.SATURATED)) != 0)))
+    # Of a depth that is out of range, light was enough to find it.
+    cause = flags & int(Flag.SATURATED | Flag.OUT_OF_RANGE)
+    too_bright = int(np.count_nonzero(is_lit & ~is_measured & (cause == int(Flag.SATURATED))))
     yield _share(
         "exposure",
         "overexposed pixels without a depth",

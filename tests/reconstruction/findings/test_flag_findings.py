@@ -84,6 +84,7 @@ def test_pixels_that_are_lost_to_overexposure_are_told_by_themselves() -> None:
     assert "30% of the lit pixels" in fit.words
     assert "darker setting" in fit.words
     assert Fit.of(judged(flags(Flag.SATURATED, 0.3))).parts == (), "these have a depth"
+    assert Fit.of(judged(flags(Flag.SATURATED | Flag.OUT_OF_RANGE, 0.3))).parts == ("coverage",)
     assert Fit.of(judged(bright | np.flip(flags(Flag.OUT_OF_RANGE, 0.2)))).parts == ("exposure", "coverage")
 
 
