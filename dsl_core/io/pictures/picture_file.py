@@ -111,6 +111,9 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
     if values.dtype.kind == "b":
         # As pictures of one bit are read.
         values = values.astype(np.uint8) * np.uint8(255)
+    if values.dtype == np.float16:
+        # Numbers of so few bits end at 65504, below what white may be.
+        values = values.astype(np.float32)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
     if values.ndim == 3 and values.shape[2] in (3, 4):
@@ -140,10 +143,11 @@ def load_mosaic(picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[n
     values = load_values(picture, mapping.raw)
     if mapping.encoding == "srgb":
         return np.asarray(np.rint(_one_channel(_decoded(values, picture, mapping), mapping)), np.uint16)
-    is_float = values.dtype.kind == "f"
+    # Whole numbers of more than 16 bits, such as sums of exposures, have a white of their own as well.
+    is_scaled = values.dtype.kind == "f" or values.dtype.itemsize > 2
     if values.ndim == 3:
         values = _one_channel(values, mapping)
-    if is_float and mapping.full_scale is not None:
+    if is_scaled and mapping.full_scale is not None:
         values = _share_of_white(values, mapping.full_scale) * (2**bit_depth - 1)
     return _whole(values, picture, mapping, bit_depth)
 

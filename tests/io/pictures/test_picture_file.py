@@ -64,6 +64,15 @@ def test_bits_are_moved_to_the_lower_end_and_floats_scaled(tmp_path: Path) -> No
         load_mosaic(Picture(tmp_path / "a.tif"), MAPPING, 8)
 
 
+@pytest.mark.parametrize("dtype", [np.float16, np.uint32, np.int64])
+def test_values_of_few_and_of_many_bits_are_scaled_by_their_white(tmp_path: Path, dtype: type) -> None:
+    """Half-precision numbers end at 65504, and sums of exposures beyond 16 bits."""
+    white = 4080.0 if dtype is np.float16 else 2.0**20 - 2.0**12
+    np.save(tmp_path / "a.npy", (GREY / 255.0 * white).astype(dtype))
+    scaled = MAPPING.model_copy(update={"full_scale": white})
+    assert np.abs(load_mosaic(Picture(tmp_path / "a.npy"), scaled, 16) / 257.0 - GREY).max() < 0.1
+
+
 def test_true_is_white(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", GREY > 100)
     assert np.array_equal(load_mosaic(Picture(tmp_path / "a.npy"), MAPPING, 8), np.where(GREY > 100, 255, 0))
