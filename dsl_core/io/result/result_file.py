@@ -56,20 +56,28 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
     import zarr
 
     # What no file can hold is told before anything is written.
-    result = with_bits(result).assign_attrs(plain(result.attrs))
+    attributes = plain(result.attrs)
+    result = with_bits(_with_labels(result))
     with staged([path], overwrite=overwrite, kind=RESULT_FOLDER) as (draft,):
         group = zarr.create_group(draft, zarr_format=3)
         labels = labels_of(result)
         for name, variable in result.variables.items():
             if str(name) not in labels:
                 write_variable(group, str(name), variable)
-        seal_folder(draft, {**result.attrs, "labels": labels})
+        seal_folder(draft, {**own_attributes(attributes), "labels": labels})
     return path
 
 
 def labels_of(result: xr.Dataset) -> dict[str, list[str]]:
     """The names along the axes that have some."""
     return {str(n): c.values.tolist() for n, c in result.coords.items() if c.dtype.kind in "UO"}
+
+
+def _with_labels(result: xr.Dataset) -> xr.Dataset:
+    """The result with the names along its axes, which another reader leaves among its attributes."""
+    stored = result.attrs.get("labels", {})
+    missing = {n: v for n, v in stored.items() if n not in result.coords and result.sizes.get(n) == len(v)}
+    return result.assign_coords({n: (n, np.array(v)) for n, v in missing.items()})
 
 
 def seal_folder(folder: Path, attributes: Mapping[Any, Any]) -> None:

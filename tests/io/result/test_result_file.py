@@ -51,6 +51,14 @@ def test_plain_xarray_reads_it_without_this_package(tmp_path: Path) -> None:
         assert plain["depth_mm"].attrs["units"] == "mm"
 
 
+def test_what_plain_xarray_read_is_saved_and_loaded_like_any_result(tmp_path: Path) -> None:
+    """Its attributes hold inventory, checksum and labels of the folder that it was read from."""
+    saved = load_result(save_result(small_result(), tmp_path / "a.zarr"), lazy=False)
+    part = xr.open_zarr(tmp_path / "a.zarr").isel(x=slice(1, None))
+    again = load_result(save_result(part, tmp_path / "b.zarr"), lazy=False)
+    xr.testing.assert_identical(again, saved.isel(x=slice(1, None)))
+
+
 def test_maps_take_single_precision_on_disk_and_axes_keep_theirs(tmp_path: Path) -> None:
     result = small_result()
     result["depth_mm"] = result["depth_mm"].astype(np.float64)
