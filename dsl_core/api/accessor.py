@@ -11,7 +11,7 @@ import xarray as xr
 
 from dsl_core.api import FilePath, path_of
 from dsl_core.api.places import Place, as_array, extent_of, place_mask, require_picture, require_result
-from dsl_core.errors import DecodeError
+from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.evaluation.marks import explain_pixel, largest_difference, region_spectrum
 from dsl_core.io.export import export_by_ending
 from dsl_core.io.result.result_file import save_result
@@ -141,11 +141,12 @@ class ResultAccessor:
     def at_bands(self, spectrum: xr.DataArray) -> xr.DataArray:
         """A spectrum of `read_spectra` at the bands of this result, as a mean over each, as its own are.
 
-        Raises `CalibrationError` where the spectrum does not cover them.
+        ``spectrum`` has wavelengths (nm) as its only axis, in any order; what is NaN plays no part. Raises
+        `CalibrationError` where it has another form, or does not cover the bands.
         """
         self._require_spectra()
         nm = np.sort(self._result[BANDS].values.astype(np.float64))
-        curve = SpectralCurve.of(spectrum[BANDS].values, spectrum.values)
+        curve = _curve(spectrum)
         found = at_bands(curve, nm, stated_band_width_nm(self._result.attrs, nm))
         return xr.DataArray(found.values, {BANDS: nm}, (BANDS,), name=spectrum.name)
 
@@ -265,6 +266,20 @@ def _flags(result: xr.Dataset) -> xr.DataArray:
     known = (result["depth_mm"] if "depth_mm" in result else result["reflectance"]).notnull()
     known = known.all(BANDS) if BANDS in known.dims else known
     return known.copy(data=np.where(known.values, 0, int(Flag.NON_FINITE)))
+
+
+def _curve(spectrum: xr.DataArray) -> SpectralCurve:
+    """A spectrum over wavelengths in any order, as far as it is known; raises `CalibrationError`."""
+    if not isinstance(spectrum, xr.DataArray) or spectrum.dims != (BANDS,) or BANDS not in spectrum.coords:
+        raise CalibrationError(
+            f"This is not one spectrum over {BANDS}. Give one of read_spectra(file), such as"
+            " read_spectra(file)[name], or the reflectance of a spectrum or region of a result."
+        )
+    known = spectrum.astype(np.float64).dropna(BANDS).sortby(BANDS)
+    nm = known[BANDS].values.astype(np.float64)
+    if not nm.size or not np.isfinite(nm).all() or not (np.diff(nm) > 0).all():
+        raise CalibrationError(f"The {BANDS} of the spectrum are not known, or not all different.")
+    return SpectralCurve.of(nm, known.values)
 
 
 def _one_spectrum(given: xr.Dataset) -> xr.Dataset:

@@ -114,10 +114,12 @@ def predict(rig: DeviceRig, plan: CapturePlan | str, calibration: Rig | FilePath
 def scan(
     rig: DeviceRig,
     folder: FilePath,
-    plan: CapturePlan | str = "reference",
+    plan: CapturePlan | str | None = None,
     progress: Progress | None = None,
 ) -> ScanReader:
     """Capture a plan, or the preset of that name, into a folder, and return the stored scan.
+
+    Without a plan it is the preset ``reference``.
 
     Every frame is on disk before the next is taken. A folder with an unfinished scan of the same plan and rig
     is resumed, and one with a finished scan is left as it is. Raises `PlanError` for a plan that is
@@ -129,7 +131,7 @@ def scan(
     path = path_of(folder)
     if (path / MANIFEST_NAME).exists():
         refuse_other_rig(path, read_manifest(path).notes, rig.notes, default_options)
-    pipeline.scan(rig, _plan(rig, plan), path, progress, dict(rig.notes))
+    pipeline.scan(rig, _plan(rig, plan or "reference"), path, progress, dict(rig.notes))
     return ScanReader(path)
 
 

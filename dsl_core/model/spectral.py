@@ -21,8 +21,9 @@ MOST_BANDS = 1001
 NOISE_SHARE = 0.02
 #: Samples of a band's triangle across its width at half height.
 _PER_WIDTH = 32
-#: At most this share of a band's triangle may lie beyond the ends of a spectrum.
-MOST_BEYOND = 0.5
+#: At most this share of a band's triangle may lie beyond the ends of a spectrum: it then ends half a width
+#: from the middle of the band.
+MOST_BEYOND = 0.875
 #: A triangle of this share of a band's width stands for a point.
 _POINT = 1e-6
 

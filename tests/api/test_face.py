@@ -87,8 +87,11 @@ def test_a_scan_without_a_plan_is_the_reference_as_on_the_command_line(
         raise Cancelled(f"{plan.name}, {plan.shot_count} frames")
 
     monkeypatch.setattr(pipeline, "scan", captured)
-    with dsl.open_rig("twin") as rig, pytest.raises(Cancelled, match="reference, 748 frames"):
-        dsl.scan(rig, tmp_path / "a.dsl")
+    with dsl.open_rig("twin") as rig:
+        with pytest.raises(Cancelled, match="reference, 748 frames"):
+            dsl.scan(rig, tmp_path / "a.dsl")
+        with pytest.raises(Cancelled, match="reference, 748 frames"):
+            dsl.scan(rig, tmp_path / "a.dsl", plan=None)
 
 
 def test_plans_by_name_and_with_changes() -> None:

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 import dsl_core as dsl
-from dsl_core.errors import StoreError
+from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.result.result_arrays import load_arrays
 from dsl_core.model.result import Flag, build_result
 from dsl_core.model.result_order import canonical, with_axes
@@ -175,6 +175,22 @@ def test_a_spectrum_of_another_instrument_is_averaged_over_bands_in_any_order(
     width_nm = (655.0 - 432.5) / 2
     assert float(means.sel(wavelength_nm=550)) == pytest.approx(1 / width_nm, rel=0.1)
     assert (result["reflectance"] - means).sizes == result["reflectance"].sizes
+
+
+def test_a_spectrum_is_averaged_as_far_as_it_is_known_and_nothing_else_is(tmp_path: Path) -> None:
+    accessor = dsl.load_result(dsl.save_result(small_result(), tmp_path / "a.zarr")).dsl
+    fine = np.arange(400.0, 701.0)
+    line = xr.DataArray(fine / 1000, {"wavelength_nm": fine}, ("wavelength_nm",))
+    holed = line[::-1].where(line["wavelength_nm"] != 690)
+    xr.testing.assert_allclose(accessor.at_bands(holed), accessor.at_bands(line))
+    own = accessor.spectrum(2, 1)
+    np.testing.assert_allclose(accessor.at_bands(own["reflectance"]), own["reflectance"], atol=1e-5)
+    wrongs = own, "tile.csv", np.ones(301), line.expand_dims(x=2), line.drop_vars("wavelength_nm")
+    for wrong in wrongs:
+        with pytest.raises(CalibrationError, match="not one spectrum"):
+            accessor.at_bands(wrong)
+    with pytest.raises(CalibrationError, match="not all different"):
+        accessor.at_bands(xr.concat([line, line], "wavelength_nm"))
 
 
 def test_a_spectrum_of_finer_bands_is_averaged_before_it_is_subtracted(tmp_path: Path) -> None:

@@ -56,6 +56,17 @@ def test_what_a_spectrum_does_not_cover_is_not_made_up() -> None:
         at_bands(SpectralCurve.of([500.0, 600.0], [0.1, 0.2]), BANDS_NM)
 
 
+@pytest.mark.parametrize(("beyond_nm", "covers"), [(2.4, True), (2.7, False)])
+def test_a_spectrum_may_end_half_a_width_from_the_middle_of_a_band(beyond_nm: float, covers: bool) -> None:
+    nm = np.linspace(BANDS_NM[0] + beyond_nm, BANDS_NM[-1], 500)
+    curve = SpectralCurve.of(nm, 0.2 + 0.001 * (nm - 430))
+    if covers:
+        assert at_bands(curve, BANDS_NM, 5.0).values[:2] == pytest.approx([0.2, 0.205], abs=0.005)
+    else:
+        with pytest.raises(CalibrationError, match="It covers"):
+            at_bands(curve, BANDS_NM, 5.0)
+
+
 def test_bands_that_were_picked_are_as_wide_as_they_were_reconstructed() -> None:
     edge = SpectralCurve.of(FINE_NM, np.where(FINE_NM > 590, 0.6, 0.05))
     whole = at_bands(edge, BANDS_NM).values

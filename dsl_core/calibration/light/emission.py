@@ -40,6 +40,8 @@ SCALES = (0.5, 1.0, 2.0, 4.0)
 #: Steps in which a curve is told where values are farther apart, and the largest step of values that tells
 #: the peak of an LED, nm.
 FINE_NM, MOST_STEP_NM = 1.0, 10.0
+#: Share of the strongest light from which a wavelength belongs to an LED.
+LIT_SHARE = 0.02
 #: Half width (nm) of the envelope's maximum and blur, and its least value as a share of the peak.
 ENVELOPE_NM, ENVELOPE_FLOOR = 6.0, 1e-3
 
@@ -52,13 +54,9 @@ def measured_emission(readings: EmissionReadings, reflectance: SpectralCurve) ->
             f"The spectrum under {' and '.join(missing)} is missing. Measure all of {', '.join(COLOURS)}."
         )
     nm = np.array(readings.readings["white"][0].wavelengths_nm)
-    if float(np.diff(nm).max()) > 1.01 * MOST_STEP_NM:
-        raise CalibrationError(
-            f"The spectra have values up to {np.diff(nm).max():g} nm apart, which is too coarse for the peaks"
-            f" of LEDs. Export them from the instrument every {MOST_STEP_NM:g} nm or finer."
-        )
     require_repeats(readings)
     mean, variance = _means(readings, nm)
+    _require_fine_steps(nm, mean)
     leds = np.stack([mean[c] - mean["black"] for c in _LEDS]) / reflectance.at(nm)
     white = (mean["white"] - mean["black"]) / reflectance.at(nm)
     noise = {c: variance[c] / reflectance.at(nm) ** 2 for c in COLOURS}
@@ -81,6 +79,18 @@ def measured_emission(readings: EmissionReadings, reflectance: SpectralCurve) ->
         nm, leds, np.sqrt(spread), (additivity, additivity_std), len(readings.readings["white"])
     )
     return found.model_copy(update={"white_parts": parts, "white_apart": apart})
+
+
+def _require_fine_steps(nm: Floats, mean: dict[LightColour, Floats]) -> None:
+    """Raise `CalibrationError` for steps in which peaks of the light of LEDs may go unseen."""
+    light = np.max([mean[colour] - mean["black"] for colour in COLOURS], axis=0)
+    is_lit = light > LIT_SHARE * light.max()
+    steps = np.diff(nm)[is_lit[1:] | is_lit[:-1]]
+    if steps.size and steps.max() > 1.01 * MOST_STEP_NM:
+        raise CalibrationError(
+            f"The spectra have values up to {steps.max():g} nm apart, which is too coarse for the peaks"
+            f" of LEDs. Export them from the instrument every {MOST_STEP_NM:g} nm or finer."
+        )
 
 
 def _means(

@@ -92,6 +92,14 @@ def test_values_too_far_apart_for_a_peak_are_refused() -> None:
         measured_emission(readings(nm=np.arange(400.0, 701.0, 20.0)), WHITE)
 
 
+def test_values_far_apart_where_leds_give_no_light_are_taken() -> None:
+    """Instruments that see from ultraviolet to infrared have coarser steps out there."""
+    inside = np.arange(400.0, 701.0, 1.0)
+    wide = np.concatenate([np.arange(200.0, 400.0, 20.0), inside, np.arange(720.0, 1001.0, 20.0)])
+    found, fine = (measured_emission(readings(nm=nm), WHITE).curves[1].at(inside) for nm in (wide, inside))
+    assert np.abs(found - fine).max() < 0.02 * fine.max()
+
+
 def test_a_single_reading_knows_its_noise() -> None:
     found = measured_emission(readings(count=1), WHITE)
     error = np.stack([c.at(NM) for c in found.curves]) - scaled_truth()
