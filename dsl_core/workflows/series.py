@@ -27,8 +27,15 @@ from dsl_core.model.attributes import plan_of, stated_band_width_nm
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.workflows.scans import truth_of
 
-#: A number of mm in the name of a result, as in ``stage 695.2 mm.zarr``.
-_MM = re.compile(r"(?<![\d.])(\d+(?:\.\d+)?)\s?mm(?![a-z])", re.IGNORECASE)
+#: A number of mm in the name of a result, as in ``stage -695,2 mm.zarr``. What can be read in two ways is
+#: found without its number: a dash after a word need not be a minus, and what parts "1,200" or "1 200" may
+#: part thousands.
+_ALONE = r"(?<![^\s_=])"
+_MM = re.compile(
+    rf"(?:((?:{_ALONE}[+\-−]|(?<!\de)(?<![\d.,+\-−]))\d+(?:\.\d+|,\d\d?)?)"
+    rf"|{_ALONE}[+\-−]?[1-9]\d?\d?\s\d{{3}}(?:[.,]\d+)?|\d)\s?mm(?![a-z])",
+    re.IGNORECASE,
+)
 #: Options of the twin that say where it puts a flat target.
 _PLACES = ("position_mm", "depth_mm")
 #: Truths that differ by less are of one scene, mm.
@@ -38,12 +45,12 @@ _SAME_MM = 1e-3
 def position_of(path: Path, attributes: Mapping[str, Any]) -> float | None:
     """Where the stage stood, mm: from the name of the result, else from the twin that took it.
 
-    >>> position_of(Path("stage 695.2 mm.zarr"), {})
-    695.2
+    >>> position_of(Path("stage -695,2 mm.zarr"), {})
+    -695.2
     """
     named = _MM.findall(path.stem)
-    if len(named) == 1:
-        return float(named[0])
+    if len(named) == 1 and named[0]:
+        return float(named[0].replace(",", ".").replace("−", "-"))
     origin = rig_of_notes(attributes)
     options = {} if origin is None else origin[1]
     for text in (options[key] for key in _PLACES if key in options):

@@ -151,6 +151,27 @@ def test_a_sweep_against_the_truth_of_the_twin(give: Give, finished: Path, tmp_p
     assert "plane.zarr shows another scene" in ending.sentence
 
 
+@pytest.mark.parametrize(
+    ("name", "position_mm"),
+    [
+        ("stage -10 mm", -10.0),
+        ("pos_−5.5mm", -5.5),
+        ("x=+3 mm", 3.0),
+        ("stage 700,2 mm", 700.2),
+        ("scan2 700 mm", 700.0),
+        ("2026-11-30 z700mm", 700.0),
+        # A dash may be a minus or not, a comma or space may part thousands: nothing is guessed.
+        ("z-12.5mm", None),
+        ("plate 2 mm z-12.5mm", None),
+        ("stage 1,200 mm", None),
+        ("stage 1 200 mm", None),
+        ("stage 7e2 mm", None),
+    ],
+)
+def test_a_name_states_a_position_in_one_way_or_not_at_all(name: str, position_mm: float | None) -> None:
+    assert position_of(Path(f"{name}.zarr"), {}) == position_mm
+
+
 def test_a_twin_says_where_it_put_the_target() -> None:
     options = '{"scene": "plane", "depth_mm": "742.5"}'
     notes = {"scanned_with": "twin", "scanned_with_options": options}
