@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QShowEvent
 
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.panel import PairPanel
@@ -57,6 +57,12 @@ class ComparePage(PageWidget):
     def _add_to_series(self) -> None:
         self.show_series()
         self.series.content.choose()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Read results again that were replaced while another page was open."""
+        super().showEvent(event)
+        self._control.read_again()
+        self._series_control.read_again()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept folders."""

@@ -32,6 +32,15 @@ def is_dir(path: Path) -> bool:
         return False
 
 
+def stamp_of(path: Path) -> tuple[int, int] | None:
+    """When a file was changed last, ns, and its size, bytes; None while it cannot be seen."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
+
+
 def barrier(path: Path) -> str:
     """Why the system does not say what is there, such as *Permission denied*; empty if it does."""
     try:

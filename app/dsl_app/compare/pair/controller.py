@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from dsl_app.compare.pair.state import Pair, PairQuantity, PairState, Side
+from dsl_app.compare.replaced import result_stamp, was_replaced
 from dsl_app.shared.evented import Value
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME
@@ -58,23 +59,31 @@ class PairController:
         side = self.state.second if second else self.state.first
         self._start(
             f"Open {path.name}",
-            lambda progress: Side(path.stem, load_arrays(path, progress)),
+            lambda progress: read_side(path, progress),
             lambda opened: self._take(side, opened),
         )
 
     def open_both(self, first: Path, second: Path) -> None:
         """Read two results as A and B."""
+        self._start(
+            f"Open {first.name} and {second.name}",
+            lambda progress: [read_side(path, progress) for path in (first, second)],
+            self._take_both,
+        )
 
-        def work(progress: Progress) -> list[Side]:
-            return [Side(path.stem, load_arrays(path, progress)) for path in (first, second)]
-
-        def done(sides: list[Side]) -> None:
-            # One at a time, each would be compared with what was open before.
-            self.state.first.set(sides[0])
-            self.state.second.set(sides[1])
-            self._compare()
-
-        self._start(f"Open {first.name} and {second.name}", work, done)
+    def read_again(self) -> bool:
+        """Read both sides again if a result was replaced after it had been read; whether one was."""
+        sides = (self.state.first.value, self.state.second.value)
+        if not any(side and was_replaced(side.arrays.path, side.stamp) for side in sides):
+            return False
+        # A job that runs now reads or compares: the next visit finds the same.
+        if not self.state.busy.value:
+            self._start(
+                "Read replaced results",
+                lambda progress: [side and as_on_disk(side, progress) for side in sides],
+                self._take_both,
+            )
+        return True
 
     def use_truth(self) -> None:
         """Use the ground truth of A's simulated scene as B."""
@@ -83,15 +92,11 @@ class PairController:
             self._notifier.tell("info", "Open a result as A first; its ground truth then becomes B.")
             return
 
-        def work(progress: Progress) -> Side:
-            from dsl_core.io.result.result_file import load_result
-            from dsl_core.workflows.scans import truth_of
-
-            progress.report("read the ground truth", 0, 1)
-            truth = truth_of(load_result(first.arrays.path))
-            return Side(f"truth of {first.name}", truth_arrays(first.arrays, truth), truth)
-
-        self._start("Read the ground truth", work, lambda side: self._take(self.state.second, side))
+        self._start(
+            "Read the ground truth",
+            lambda progress: read_truth(first, progress),
+            lambda side: self._take(self.state.second, side),
+        )
 
     def swap(self) -> None:
         """Swap A and B; the ground truth stays B."""
@@ -107,6 +112,12 @@ class PairController:
             # The ground truth belongs to the result it was read for.
             self.state.second.set(None)
         place.set(side)
+        self._compare()
+
+    def _take_both(self, sides: Sequence[Side | None]) -> None:
+        # One at a time, each would be compared with what was open before.
+        self.state.first.set(sides[0])
+        self.state.second.set(sides[1])
         self._compare()
 
     def _start(self, title: str, work: Callable[[Progress], T], done: Callable[[T], None]) -> None:
@@ -177,6 +188,13 @@ class PairController:
                 "info", "A report needs two results that can be compared. Choose A and B first."
             )
             return
+        if self.read_again():
+            self._notifier.tell(
+                "warning",
+                "A result was replaced after it had been compared, and is read again. Look at the new"
+                " figures, then write the report.",
+            )
+            return
         first, truth = pair.first, pair.second.truth
 
         def work(progress: Progress) -> Path:
@@ -206,6 +224,28 @@ class PairController:
         if pair.second.truth is not None:
             return f"dsl-scan evaluate {first}"
         return f"dsl-scan compare {first} {second}"
+
+
+def read_side(path: Path, progress: Progress) -> Side:
+    """A result as a side; raises `StoreError`."""
+    stamp = result_stamp(path)
+    return Side(path.stem, load_arrays(path, progress), stamp=stamp)
+
+
+def read_truth(first: Side, progress: Progress) -> Side:
+    """The ground truth of A's simulated scene as a side; raises `DecodeError` where there is none."""
+    from dsl_core.io.result.result_file import load_result
+    from dsl_core.workflows.scans import truth_of
+
+    progress.report("read the ground truth", 0, 1)
+    truth = truth_of(load_result(first.arrays.path))
+    return Side(f"truth of {first.name}", truth_arrays(first.arrays, truth), truth, first.stamp)
+
+
+def as_on_disk(side: Side, progress: Progress) -> Side:
+    """The side as it is on disk now; raises `StoreError`."""
+    read = read_side(side.arrays.path, progress)
+    return read if side.truth is None else read_truth(read, progress)
 
 
 def make_pair(first: Side, second: Side, progress: Progress) -> Pair:

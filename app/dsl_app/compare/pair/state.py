@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_app.compare.replaced import Stamp
 from dsl_app.shared.evented import Value
 from dsl_app.shared.spectrum import Pixel, number_text, number_with_std
 from dsl_app.shared.widget_state import ButtonState, LabelState
@@ -40,11 +41,15 @@ class PairQuantity(Enum):
 
 @dataclass(frozen=True)
 class Side:
-    """A result with a name; ``truth`` is set when this side is the ground truth of a simulated scene."""
+    """A result with a name; ``truth`` is set when this side is the ground truth of a simulated scene.
+
+    ``stamp`` is that of the result on disk when it was read.
+    """
 
     name: str
     arrays: ResultArrays
     truth: Truth | None = None
+    stamp: Stamp = None
 
     @property
     def is_simulated(self) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dsl_app.compare.replaced import Stamp, result_stamp, was_replaced
 from dsl_app.compare.series.state import SeriesKind, SeriesRow, SeriesState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME
@@ -30,6 +31,7 @@ class SeriesController:
     def __init__(self, state: SeriesState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier, self._undo = state, runner, notifier, undo
         self._reference: TruthReference | ResultReference | None = None
+        self._reference_stamp: Stamp = None
 
     # Rows ------------------------------------------------------------------------------------------
 
@@ -39,17 +41,23 @@ class SeriesController:
 
     def add(self, paths: Iterable[Path]) -> None:
         """Add results, or all results in folders."""
-        known = {row.path for row in self.state.rows.value}
+        rows = self.state.rows.value
+        known = {row.path for row in rows}
         found = [result for path in paths for result in results_in(path)]
         new = [SeriesRow(path) for path in dict.fromkeys(found) if path not in known]
         if not found:
             self._notifier.tell(
                 "warning", "There is no result here. Choose a folder NAME.zarr, or one that contains several."
             )
-        elif not new:
+        elif not new and not any(map(_is_old, rows)):
             self._notifier.tell("info", "All of these results are already in the series.")
         else:
-            self._set_rows((*self.state.rows.value, *new))
+            self._set_rows((*rows, *new))
+
+    def read_again(self) -> None:
+        """Read results again that were replaced after they had been read."""
+        if any(map(_is_old, self.state.rows.value)) or self._has_old_reference:
+            self._set_rows(self.state.rows.value)
 
     def restore(
         self, rows: Sequence[tuple[Path, float | None]], against: Path | None, region: Region | None
@@ -113,7 +121,9 @@ class SeriesController:
             self._reference = None
         # The test was of the old rows.
         self.state.test.set(None)
-        self.state.rows.set(rows)
+        if self._has_old_reference:
+            rows = self._without_points(rows)
+        self.state.rows.set(tuple(map(_renewed, rows)))
         self._judge()
         self._read()
 
@@ -137,8 +147,17 @@ class SeriesController:
         if path == self.state.against.value:
             return
         self.state.against.set(path)
-        self._reference = None
-        self._set_rows(tuple(replace(row, point=None, point_trouble="") for row in self.state.rows.value))
+        self._set_rows(self._without_points(self.state.rows.value))
+
+    @property
+    def _has_old_reference(self) -> bool:
+        against = self.state.against.value
+        return against is not None and was_replaced(against, self._reference_stamp)
+
+    def _without_points(self, rows: tuple[SeriesRow, ...]) -> tuple[SeriesRow, ...]:
+        """The rows, to be compared with a reference that is read again."""
+        self._reference, self._reference_stamp = None, None
+        return tuple(replace(row, point=None, point_trouble="") for row in rows)
 
     def set_region(self, region: Region | None) -> None:
         """Use only a part of the picture, or all of it."""
@@ -156,9 +175,10 @@ class SeriesController:
         """Read the next result that has not been read; the others follow one by one."""
         state = self.state
         kind, asked = state.kind.value, (state.region.value, state.against.value)
-        row = next((row for row in state.rows.value if not row.is_read(kind)), None)
-        if row is None or state.busy.value:
+        found = next((row for row in state.rows.value if not row.is_read(kind)), None)
+        if found is None or state.busy.value:
             return
+        row = replace(found, stamp=result_stamp(found.path))
 
         def work(progress: Progress) -> SeriesRow:
             if kind is SeriesKind.STAGE:
@@ -187,7 +207,7 @@ class SeriesController:
         if self.state.selected_row is None:
             self.select(read.path)
         if kind is SeriesKind.SWEEP:
-            self._change(read.path, point=read.point, point_trouble=read.point_trouble)
+            self._change(read.path, point=read.point, point_trouble=read.point_trouble, stamp=read.stamp)
             return
         read = self._of_one_size(read)
         self._change(
@@ -195,6 +215,7 @@ class SeriesController:
             position_mm=read.position_mm if known[0] is None else known[0],
             target=read.target,
             target_trouble=read.target_trouble,
+            stamp=read.stamp,
         )
 
     def _of_one_size(self, read: SeriesRow) -> SeriesRow:
@@ -220,10 +241,11 @@ class SeriesController:
         try:
             reference = self._reference
             if reference is None:
+                stamp = None if against is None else result_stamp(against)
                 reference = TruthReference() if against is None else ResultReference(against, progress)
                 # Another one may have been chosen while this one was read.
                 if self.state.against.value == against:
-                    self._reference = reference
+                    self._reference, self._reference_stamp = reference, stamp
             return replace(row, point=reference.judge(row.path, progress))
         except Cancelled:
             raise
@@ -297,6 +319,15 @@ def results_in(path: Path) -> list[Path]:
     if is_file(path / RESULT_NAME):
         return [path]
     return sorted(each.parent for each in path.glob(f"*/{RESULT_NAME}")) if is_dir(path) else []
+
+
+def _is_old(row: SeriesRow) -> bool:
+    return was_replaced(row.path, row.stamp)
+
+
+def _renewed(row: SeriesRow) -> SeriesRow:
+    """The row; one of a replaced result as if it had not been read."""
+    return SeriesRow(row.path, row.position_mm) if _is_old(row) else row
 
 
 def read_plane(row: SeriesRow, region: Region | None, progress: Progress) -> SeriesRow:

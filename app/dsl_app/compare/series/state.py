@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+from dsl_app.compare.replaced import Stamp
 from dsl_app.shared.evented import Value
 from dsl_core.evaluation.seen_target import Region, SeenTarget
 from dsl_core.evaluation.stage_test import StageTest
@@ -39,6 +40,7 @@ class SeriesRow:
     """A result of the series; ``position_mm`` is None while the stage position is unknown.
 
     A row that has not been read has neither a target (or point) nor a trouble, which says why there is none.
+    ``stamp`` is that of the result on disk when it was read.
     """
 
     path: Path
@@ -47,6 +49,7 @@ class SeriesRow:
     target_trouble: str = ""
     point: SweepPoint | None = None
     point_trouble: str = ""
+    stamp: Stamp = None
 
     @property
     def name(self) -> str:

@@ -12,7 +12,7 @@ from dsl_app.results.marks.spectra import NO_SPECTRUM, fill_region, mark_of_refe
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
-from dsl_app.shared.paths import barrier, there
+from dsl_app.shared.paths import barrier, stamp_of, there
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_core.errors import DslError
 from dsl_core.io.atomic import set_aside
@@ -84,7 +84,7 @@ class MarkStorage:
             return
         try:
             saved = load_annotations(result.path)
-            self._stamp = _stamp_of(annotations_path(result.path))
+            self._stamp = stamp_of(annotations_path(result.path))
         except DslError as error:
             self._fail(str(error))
             return
@@ -175,7 +175,7 @@ class MarkStorage:
         if result is None:
             return
         path = annotations_path(result.path)
-        if _stamp_of(path) not in (None, self._stamp):
+        if stamp_of(path) not in (None, self._stamp):
             self._notifier.tell(
                 "warning",
                 f"Another window has changed the marks in {path}.{set_aside(path)} Those of this window are"
@@ -183,20 +183,12 @@ class MarkStorage:
             )
         try:
             save_annotations(annotations_of(self.state.marks.value), result.path)
-            self._stamp = _stamp_of(path)
+            self._stamp = stamp_of(path)
         except DslError as error:
             self._notifier.tell("warning", f"The marks could not be saved: {error}")
 
 
 # Records on disk -----------------------------------------------------------------------------------
-
-
-def _stamp_of(path: Path) -> tuple[int, int] | None:
-    try:
-        status = path.stat()
-    except OSError:
-        return None
-    return status.st_mtime_ns, status.st_size
 
 
 def marks_of(saved: Annotations, result: ResultArrays, progress: Progress) -> tuple[Mark, ...]:

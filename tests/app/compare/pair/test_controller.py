@@ -140,6 +140,47 @@ def test_a_report_of_two_results_has_their_figures_and_where_they_differ(
     assert "pair.html" in notifier.told[-1][1]
 
 
+def moved(path: Path, name: Path, by_mm: float) -> Path:
+    """A result, saved under a name with all depths moved, over whatever has the name."""
+    result = load_result(path).load()
+    result["depth_mm"] = result["depth_mm"] + by_mm
+    return save_result(result, name, overwrite=True)
+
+
+def test_a_result_that_is_replaced_is_read_again_and_reported_only_as_seen(
+    results: tuple[Path, Path, Path], tmp_path: Path
+) -> None:
+    compare, notifier = controller()
+    compare.open(moved(results[0], tmp_path / "again.zarr", 1.0))
+    compare.open(results[0])
+    assert not compare.read_again()
+    moved(results[0], tmp_path / "again.zarr", 5.0)
+    compare.write_report(tmp_path / "r.html")
+    assert not (tmp_path / "r.html").exists()
+    assert "was replaced" in notifier.told[-1][1]
+    pair = compare.state.pair.value
+    assert pair is not None
+    assert float(np.nanmean(pair.first.arrays["depth_mm"] - pair.second.arrays["depth_mm"])) > 4.9
+    compare.write_report(tmp_path / "r.html")
+    assert (tmp_path / "r.html").exists()
+
+
+@pytest.mark.slow
+def test_the_truth_of_a_replaced_result_is_read_again_with_it(
+    results: tuple[Path, Path, Path], tmp_path: Path
+) -> None:
+    compare, _ = controller()
+    compare.open(moved(results[0], tmp_path / "again.zarr", 0.0))
+    compare.use_truth()
+    moved(results[0], tmp_path / "again.zarr", 5.0)
+    assert compare.read_again()
+    pair = compare.state.pair.value
+    assert pair is not None
+    assert pair.second.truth is not None
+    assert np.nanmedian(pair.first.arrays["depth_mm"] - pair.second.arrays["depth_mm"]) > 3.0
+    assert not compare.read_again()
+
+
 def test_what_is_not_a_result_is_left_to_others(tmp_path: Path) -> None:
     compare, notifier = controller()
     assert not compare.open(tmp_path)

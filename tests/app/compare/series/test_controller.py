@@ -15,7 +15,7 @@ from dsl_core.io.result.result_file import save_result
 from dsl_core.model.result import build_result
 from dsl_core.progress import NoProgress
 from tests.app.support.doubles import InlineRunner, ManualRunner, RecordingNotifier
-from tests.cases.stage_series import NM, flat_arrays, write_stage, write_sweep
+from tests.cases.stage_series import NM, flat_arrays, sweep_result, write_stage, write_sweep
 
 POSITIONS = (700.0, 725.0, 750.0, 775.0)
 
@@ -40,6 +40,11 @@ def series(undo: UndoStack) -> SeriesController:
 def told(series: SeriesController) -> str:
     assert isinstance(series._notifier, RecordingNotifier)
     return series._notifier.told[-1][1]
+
+
+def told_anything(series: SeriesController) -> bool:
+    assert isinstance(series._notifier, RecordingNotifier)
+    return bool(series._notifier.told)
 
 
 def test_a_folder_of_results_becomes_a_depth_test(series: SeriesController, stage: list[Path]) -> None:
@@ -117,6 +122,33 @@ def test_a_row_that_was_added_again_is_there_once_after_undo(
     assert rows[1].position_mm == 725.5
     undo.redo()
     assert [row.path for row in series.state.rows.value] == [stage[0], *stage[2:]]
+
+
+def test_a_replaced_result_is_read_again(series: SeriesController, tmp_path: Path) -> None:
+    path = write_stage(tmp_path, 700.0, noise_mm=0.1)
+    series.add([path])
+    series.set_position(path, 705.0)
+    save_result(build_result(flat_arrays(700.0, 0.4), NM, {}), path, overwrite=True)
+    series.add([path])
+    (row,) = series.state.rows.value
+    assert row.target is not None
+    assert row.target.plane.rms_mm > 0.3
+    assert row.position_mm == 705.0
+    assert not told_anything(series)
+
+
+@pytest.mark.slow
+def test_a_replaced_reference_is_read_again(series: SeriesController, tmp_path: Path) -> None:
+    reference, *scans = write_sweep(tmp_path)
+    series.ask(SeriesKind.SWEEP)
+    series.compare_with(reference)
+    series.add(scans)
+    before = [point.depth_mm for point in series.state.points]
+    save_result(sweep_result(400.0, 3.0, 0.0), reference, overwrite=True)
+    series.read_again()
+    after = [point.depth_mm for point in series.state.points]
+    assert len(after) == len(before) == len(scans)
+    assert min(error for error in after if error is not None) > 2
 
 
 def test_a_region_is_read_again(series: SeriesController, undo: UndoStack, stage: list[Path]) -> None:
