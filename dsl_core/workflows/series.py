@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -127,7 +127,12 @@ class TruthReference:
     name = "the truth of the twin"
 
     def __init__(self) -> None:
-        self._known: dict[object, Truth] = {}
+        self._known: dict[Path, tuple[str, Truth]] = {}
+
+    def keep(self, paths: Collection[Path]) -> None:
+        """Forget results other than these: those to come need not show their scene."""
+        for path in [path for path in list(self._known) if path not in paths]:
+            self._known.pop(path, None)
 
     def judge(self, path: Path, progress: Progress) -> SweepPoint:
         """Seconds and errors against the truth; raises `DecodeError` for another scene."""
@@ -141,12 +146,16 @@ class TruthReference:
         places = [result[axis].values.tolist() for axis in ("x", "y") if axis in result.coords]
         width_nm = stated_band_width_nm(result.attrs, bands)
         key = repr((rig_of_notes(result.attrs), tuple(bands), width_nm, places))
-        if key not in self._known:
+        # What was known of this path is of a result that has been replaced.
+        self._known.pop(path, None)
+        known = list(self._known.values())
+        truth = next((truth for of, truth in known if of == key), None)
+        if truth is None:
             truth = truth_of(result)
-            if self._known:
-                _require_same_scene(path, next(iter(self._known.values())), truth)
-            self._known[key] = truth
-        return self._known[key]
+            if known:
+                _require_same_scene(path, known[0][1], truth)
+        self._known[path] = key, truth
+        return truth
 
 
 class ResultReference:
@@ -155,6 +164,9 @@ class ResultReference:
     def __init__(self, path: Path, progress: Progress | None = None) -> None:
         self.path, self.name = path, path.stem
         self._arrays = load_arrays(path, progress)
+
+    def keep(self, paths: Collection[Path]) -> None:
+        """Nothing to forget: every result is compared with the reference alone."""
 
     def judge(self, path: Path, progress: Progress) -> SweepPoint:
         """Seconds and differences from the reference; raises `DecodeError` for the reference itself."""
@@ -201,6 +213,6 @@ def _require_same_scene(path: Path, known: Truth, truth: Truth) -> None:
     ):
         return
     raise DecodeError(
-        f"{path.name} shows another scene or part of it, or another camera captured it, than the results"
-        " before it. A sweep compares scans of one scene, all of the same part."
+        f"{path.name} shows another scene or part of it, or another camera captured it, than the other"
+        " results. A sweep compares scans of one scene, all of the same part."
     )

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from dsl_core.workflows.series import ResultReference, TruthReference
 
 
+#: Why a row was not read.
+CANCELLED = "Not read because the job was cancelled. Remove it and add it again."
+
+
 class SeriesController:
     """Fills a `SeriesState`; results are read one after the other."""
 
@@ -82,19 +86,19 @@ class SeriesController:
         if at is None:
             self._notifier.tell("info", "Select a row first.")
             return
-        gone = rows[at]
+        # The others may show another scene by the time it comes back.
+        gone = replace(rows[at], point=None, point_trouble="")
+
+        def others() -> tuple[SeriesRow, ...]:
+            return tuple(row for row in self.state.rows.value if row.path != path)
 
         def put_back() -> None:
             # It may have been added again meanwhile, and has one place all the same.
-            now = [row for row in self.state.rows.value if row.path != path]
+            now = others()
             self._set_rows((*now[:at], gone, *now[at:]))
 
         self._undo.push(
-            Change(
-                f"remove {gone.name}",
-                lambda: self._set_rows(tuple(row for row in self.state.rows.value if row.path != path)),
-                put_back,
-            )
+            Change(f"remove {gone.name}", lambda: self._set_rows(tuple(map(_retried, others()))), put_back)
         )
 
     def set_position(self, path: Path, position_mm: float) -> None:
@@ -116,14 +120,14 @@ class SeriesController:
         self._set_rows(tuple(replace(row, **fields) if row.path == path else row for row in rows))  # type: ignore[arg-type]
 
     def _set_rows(self, rows: tuple[SeriesRow, ...]) -> None:
-        if not rows:
-            # The next results may show another scene.
-            self._reference = None
+        if self._reference is not None:
+            # The next results may show another scene than removed ones.
+            self._reference.keep([row.path for row in rows])
         # The test was of the old rows.
         self.state.test.set(None)
         if self._has_old_reference:
             rows = self._without_points(rows)
-        self.state.rows.set(tuple(map(_renewed, rows)))
+        self.state.rows.set(_of_one_size(tuple(map(_renewed, rows))))
         self._judge()
         self._read()
 
@@ -202,14 +206,13 @@ class SeriesController:
         """Keep what was read, but prefer a position typed in the meantime; it may have been removed since."""
         known = [row.position_mm for row in self.state.rows.value if row.path == read.path]
         if not known:
-            self._read()
+            self._set_rows(self.state.rows.value)
             return
         if self.state.selected_row is None:
             self.select(read.path)
         if kind is SeriesKind.SWEEP:
             self._change(read.path, point=read.point, point_trouble=read.point_trouble, stamp=read.stamp)
             return
-        read = self._of_one_size(read)
         self._change(
             read.path,
             position_mm=read.position_mm if known[0] is None else known[0],
@@ -218,18 +221,9 @@ class SeriesController:
             stamp=read.stamp,
         )
 
-    def _of_one_size(self, read: SeriesRow) -> SeriesRow:
-        first = next((row.target for row in self.state.rows.value if row.target is not None), read.target)
-        if read.target is None or first is None or first.shape == read.target.shape:
-            return read
-        sizes = [f"{width} × {height}" for height, width in (read.target.shape, first.shape)]
-        return _without(read, SeriesKind.STAGE, f"It has {sizes[0]} pixels, the first result {sizes[1]}.")
-
     def _cancelled(self, kind: SeriesKind) -> None:
-        why = "Not read because the job was cancelled. Remove it and add it again."
-        self._set_rows(
-            tuple(row if row.is_read(kind) else _without(row, kind, why) for row in self.state.rows.value)
-        )
+        rows = self.state.rows.value
+        self._set_rows(tuple(row if row.is_read(kind) else _without(row, kind, CANCELLED) for row in rows))
 
     def _compare(self, row: SeriesRow, progress: Progress) -> SeriesRow:
         """The row with its errors; the reference is read with the first row."""
@@ -328,6 +322,25 @@ def _is_old(row: SeriesRow) -> bool:
 def _renewed(row: SeriesRow) -> SeriesRow:
     """The row; one of a replaced result as if it had not been read."""
     return SeriesRow(row.path, row.position_mm) if _is_old(row) else row
+
+
+def _retried(row: SeriesRow) -> SeriesRow:
+    """The row; what was refused beside others is compared again."""
+    return row if row.point_trouble in ("", CANCELLED) else replace(row, point_trouble="")
+
+
+def _of_one_size(rows: tuple[SeriesRow, ...]) -> tuple[SeriesRow, ...]:
+    """The rows; targets of another size than the first do not count."""
+    first = next((row.target.shape for row in rows if row.target is not None), (0, 0))
+
+    def judged(row: SeriesRow) -> SeriesRow:
+        if row.target is None:
+            return row
+        sizes = [f"{width} × {height}" for height, width in (row.target.shape, first)]
+        trouble = f"It has {sizes[0]} pixels, the first result {sizes[1]}." if sizes[0] != sizes[1] else ""
+        return row if trouble == row.target_trouble else replace(row, target_trouble=trouble)
+
+    return tuple(map(judged, rows))
 
 
 def read_plane(row: SeriesRow, region: Region | None, progress: Progress) -> SeriesRow:

@@ -39,8 +39,8 @@ NOTHING = {
 class SeriesRow:
     """A result of the series; ``position_mm`` is None while the stage position is unknown.
 
-    A row that has not been read has neither a target (or point) nor a trouble, which says why there is none.
-    ``stamp`` is that of the result on disk when it was read.
+    A row that has not been read has neither a target (or point) nor a trouble, which says why there is none
+    or why it does not count beside the other rows. ``stamp`` is that of the result on disk when it was read.
     """
 
     path: Path
@@ -66,9 +66,8 @@ class SeriesRow:
         """Why the result does not count; empty when it does or has not been read."""
         if kind is SeriesKind.SWEEP:
             return self.point_trouble
-        if self.target is not None and self.position_mm is None:
-            return "Type the stage position."
-        return self.target_trouble
+        lacks_position = self.target is not None and self.position_mm is None
+        return self.target_trouble or ("Type the stage position." if lacks_position else "")
 
     def counts(self, kind: SeriesKind) -> bool:
         """Whether the result contributes to the figures."""

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesKind, SeriesRow, SeriesState
 from dsl_app.shared.undo import UndoStack
 
+from dsl_core.evaluation.summary import Truth
+from dsl_core.evaluation.time_sweep import SweepPoint
 from dsl_core.io.result.result_file import save_result
 from dsl_core.model.result import build_result
 from dsl_core.progress import NoProgress
@@ -122,6 +125,85 @@ def test_a_row_that_was_added_again_is_there_once_after_undo(
     assert rows[1].position_mm == 725.5
     undo.redo()
     assert [row.path for row in series.state.rows.value] == [stage[0], *stage[2:]]
+
+
+def test_rows_of_another_size_count_once_the_first_is_gone(
+    series: SeriesController, undo: UndoStack, stage: list[Path], tmp_path: Path
+) -> None:
+    small = {name: values[..., :30] for name, values in flat_arrays(800.0).items()}
+    other = save_result(build_result(small, NM, {}), tmp_path / "small 800 mm.zarr")
+    series.add([other])
+    series.add(stage)
+    refused = [bool(row.trouble(SeriesKind.STAGE)) for row in series.state.rows.value]
+    assert refused == [False, *[True] * len(stage)]
+    series.remove(other)
+    assert series.state.test.value is not None
+    assert len(series.state.counted) == len(stage)
+    undo.undo()
+    assert [row.path for row in series.state.counted] == [other]
+
+
+def simulate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read results whose names begin with their scene, and a truth for each scene, without the twin."""
+    from dsl_core.workflows import series as workflow
+
+    def load(path: Path) -> xr.Dataset:
+        return xr.Dataset(attrs={"scene": path.stem[0], "capture_seconds": 1.0})
+
+    for name, stand_in in (
+        ("load_result", load),
+        ("truth_of", lambda result: Truth(np.full((2, 2), float(ord(result.attrs["scene"]))))),
+        ("rig_of_notes", lambda attributes: attributes["scene"]),
+        ("evaluate", lambda *_: None),
+        ("point_against_truth", lambda *_: SweepPoint("", 1.0, depth_mm=0.1)),
+    ):
+        monkeypatch.setattr(workflow, name, stand_in)
+
+
+@pytest.fixture
+def scenes(series: SeriesController, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
+    """Results of scenes a and c for a sweep."""
+    simulate(monkeypatch)
+    series.ask(SeriesKind.SWEEP)
+    paths = {name: tmp_path / f"{name}.zarr" for name in ("a1", "a2", "c1", "c2")}
+    for path in paths.values():
+        path.mkdir()
+        (path / "zarr.json").write_text("{}", encoding="utf-8")
+    return paths
+
+
+def counted(series: SeriesController) -> list[str]:
+    return [row.name for row in series.state.counted]
+
+
+def test_a_scene_is_refused_only_beside_results_of_another(
+    series: SeriesController, undo: UndoStack, scenes: dict[str, Path]
+) -> None:
+    series.add(scenes.values())
+    assert counted(series) == ["a1", "a2"]
+    series.remove(scenes["a1"])
+    assert counted(series) == ["a2"]
+    series.remove(scenes["a2"])
+    assert counted(series) == ["c1", "c2"]
+    undo.undo()
+    assert counted(series) == ["c1", "c2"], "scenes of those that are there count"
+    assert "shows another scene" in series.state.rows.value[0].point_trouble
+
+
+def test_a_sweep_keeps_its_reference_when_all_rows_are_removed_and_come_back(
+    series: SeriesController, undo: UndoStack, scenes: dict[str, Path], tmp_path: Path
+) -> None:
+    both = [scenes["a1"], scenes["a2"]]
+    series.add(both)
+    for path in both:
+        series.remove(path)
+    undo.undo()
+    undo.undo()
+    assert counted(series) == ["a1", "a2"]
+    series.add([scenes["c1"]])
+    assert counted(series) == ["a1", "a2"]
+    series.write_report(tmp_path / "sweep.html")
+    assert "the truth of the twin" in (tmp_path / "sweep.html").read_text(encoding="utf-8")
 
 
 def test_a_replaced_result_is_read_again(series: SeriesController, tmp_path: Path) -> None:
