@@ -23,6 +23,7 @@ from dsl_app.shell.warm_up import WarmUp
 
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.plan import LineComb
+from tests.app.support.results_controller import exports
 from tests.benchmarks.stall_watch import Stalls, StallWatch
 from tests.screens.stage import Stage
 
@@ -277,13 +278,13 @@ class WindowJobs:
         page = self.stage.window.open_page("results")
         assert isinstance(page, ResultsPage)
         with self._job("export"):
-            page._control.export.write(
+            exports(page._control).write(
                 {form: self.stage.folder / f"out.{ENDINGS[form]}" for form in ENDINGS}, True
             )
             self.stage.idle()
         runner = self.stage.window.parts.runner
         for form, ending in ENDINGS.items():
-            page._control.export.write({form: self.stage.folder / f"out.{ending}"}, True)
+            exports(page._control).write({form: self.stage.folder / f"out.{ending}"}, True)
             self._live_for(EXPORT_S)
             if runner.active:
                 self._cancel(f"export {form}", runner.cancel_all, lambda: not runner.active)

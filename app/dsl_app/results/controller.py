@@ -40,7 +40,7 @@ class ResultsController:
     """Fills a `ResultsState`.
 
     ``marks`` has the pins, regions and references, ``search`` looks for spectra, ``answers``
-    names materials, ``contrast`` sets bands and levels of pictures, ``export`` writes files.
+    names materials, ``contrast`` sets bands and levels of pictures.
     ``opened`` fires when a result is open and its views are set, so that listeners can change them.
     """
 
@@ -50,7 +50,6 @@ class ResultsController:
         self.search = SearchController(state, runner, notifier)
         self.answers = AnswersController(state, runner, notifier)
         self.contrast = ContrastController(state)
-        self.export = ExportController(state, runner, notifier)
         self._undo = undo
         self.opened: Event[ResultArrays] = Event()
         self._block: FrameBlock | None = None
@@ -217,6 +216,11 @@ class ResultsController:
             self._cloud_by_chosen = None
             if by.value is ResultView.DEPTH:
                 by.set(chosen)
+
+    def export(self) -> ExportController | None:
+        """What writes files of the open result as it is looked at now; None while it is on no disk."""
+        result = self.state.saved_result
+        return result and ExportController(result, self.state, self._runner, self._notifier)
 
     def command_line(self) -> str:
         """The command that reconstructs the offered scan or exports the open result."""

@@ -244,20 +244,21 @@ class ResultsPage(PageWidget):
 
     def export(self) -> None:
         """Open the export dialog."""
-        result = self._state.saved_result
-        if result is not None:
-            self._open_dialog(ExportDialog(result, self._control.export, self))
+        control = self._control.export()
+        if control is not None:
+            self._open_dialog(ExportDialog(control, self))
 
     def report(self) -> None:
         """Ask for a file and write a report about what is marked."""
-        result = self._state.saved_result
+        # Another result may be opened while a person chooses.
+        result, materials = self._state.saved_result, self._state.materials.value
         if result is None:
             return
         draft = str(folder_for(result.path) / f"{result.path.stem}_report.html")
         kinds = "HTML page (*.html);;PDF (*.pdf)"
         target = ask_target(self, "Write a report", draft, kinds)
         if target is not None:
-            self._control.answers.write_report(target[0], overwrite=target[1])
+            self._control.answers.write_report(result, materials, *target)
 
     def subject(self) -> Path | None:
         """The offered scan, or the open result."""

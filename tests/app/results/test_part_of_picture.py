@@ -13,7 +13,7 @@ from dsl_app.results.pixel_info import pixel_text
 from dsl_app.results.state import SearchMode
 
 from dsl_core.io.result.result_file import load_result, save_result
-from tests.app.support.results_controller import Bench
+from tests.app.support.results_controller import Bench, exports
 from tests.app.support.small_result import write_small_result
 
 #: Where the part begins, and a pixel of its arrays, which is 22, 10 in the whole picture.
@@ -29,7 +29,7 @@ def part(tmp_path: Path) -> Bench:
 
 def test_a_pin_is_exported_as_the_pixel_that_was_pointed_at(part: Bench, tmp_path: Path) -> None:
     part.control.marks.pin(PIXEL)
-    part.control.export.write({"csv": tmp_path / "a.csv"}, overwrite=False)
+    exports(part.control).write({"csv": tmp_path / "a.csv"}, overwrite=False)
     lines = [line for line in (tmp_path / "a.csv").read_text("utf-8").splitlines() if line[0] != "#"]
     rows = list(csv.DictReader(lines))
     assert {(row["x_px"], row["y_px"]) for row in rows} == {("22", "10")}

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 from dsl_app.results.controller import ResultsController
+from dsl_app.results.export.controller import ExportController
 from dsl_app.results.state import ResultsState
 from dsl_app.shared.undo import UndoStack
 
+from dsl_core.io.result.result_arrays import ResultArrays
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 from tests.app.support.small_result import write_small_result
 
@@ -31,6 +33,19 @@ class Bench:
     @property
     def names(self) -> list[str]:
         return [mark.name for mark in self.state.marks.value]
+
+
+def opened(state: ResultsState) -> ResultArrays:
+    """The result that is open."""
+    assert state.result.value is not None
+    return state.result.value
+
+
+def exports(control: ResultsController) -> ExportController:
+    """What writes files of the result that is open, as it is looked at now."""
+    made = control.export()
+    assert made is not None
+    return made
 
 
 @pytest.fixture

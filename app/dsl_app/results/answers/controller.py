@@ -132,11 +132,8 @@ class AnswersController:
         self._request += 1
         self.state.materials.set(None)
 
-    def write(self, path: Path, overwrite: bool = False) -> None:
-        """Write the map: ENVI (.hdr), points (.ply) or table (.csv), as the ending of the path says."""
-        materials, result = self.state.materials.value, self.state.result.value
-        if materials is None or result is None:
-            return
+    def write(self, result: ResultArrays, materials: Materials, path: Path, overwrite: bool = False) -> None:
+        """Write a map: ENVI (.hdr), points (.ply) or table (.csv), as the ending of the path says."""
 
         def work(progress: Progress) -> list[Path]:
             from dsl_core.analysis.classification import write_classification
@@ -150,11 +147,10 @@ class AnswersController:
 
         self._runner.submit(Job(f"Write {path.name}", work, done))
 
-    def write_report(self, path: Path, overwrite: bool = False) -> None:
-        """Write a report about the result, its saved marks and its materials: HTML page or PDF."""
-        materials, result = self.state.materials.value, self.state.result.value
-        if result is None:
-            return
+    def write_report(
+        self, result: ResultArrays, materials: Materials | None, path: Path, overwrite: bool = False
+    ) -> None:
+        """Write a report about a result, its saved marks and its materials: HTML page or PDF."""
 
         def work(progress: Progress) -> Path:
             from dsl_core.analysis.session_report import session_content, write_report

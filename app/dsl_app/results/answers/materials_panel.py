@@ -208,14 +208,15 @@ class MaterialsPanel(QWidget):
 
     def choose_target(self) -> None:
         """Ask for a file and write the map."""
-        result = self._state.result.value
-        if result is None:
+        # Another result may be opened while a person chooses.
+        result, materials = self._state.result.value, self._state.materials.value
+        if result is None or materials is None:
             return
         draft = str(folder_for(result.path) / f"{result.path.stem}_materials.hdr")
         kinds = "ENVI classification (*.hdr);;Points with their class (*.ply);;Table of areas (*.csv)"
         target = ask_target(self, "Write the map of materials", draft, kinds)
         if target is not None:
-            self._control.write(target[0], overwrite=target[1])
+            self._control.write(result, materials, *target)
 
     def _new_measure(self) -> None:
         """Other limits belong to another measure; a map that is shown keeps its own."""

@@ -19,18 +19,25 @@ from dsl_core.words import counted
 
 
 class ExportController:
-    """Writes the result of a `ResultsState` in other formats."""
+    """Writes a result in other formats as it is looked at when this is made.
 
-    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier) -> None:
-        self.state, self._runner, self._notifier = state, runner, notifier
+    Another result may be opened behind a dialog: its name, pins and pictures belong to the first one.
+    """
+
+    def __init__(
+        self, result: ResultArrays, state: ResultsState, runner: JobRunner, notifier: Notifier
+    ) -> None:
+        """Keep what is marked on the open ``result``, and how its pictures are shown."""
+        self.result, self._runner, self._notifier = result, runner, notifier
+        pins = [mark.pixel for mark in state.marks.value if mark.pixel and not mark.trouble]
+        self._pixels = [result.in_picture(pin) for pin in pins]
+        self._choice, self._look = picture_choice(state), picture_look(state)
 
     def refusal(self, form: Format) -> str:
         """Why a format cannot be written for this result; empty when it can."""
-        result = self.state.result.value
-        has_pins = any(mark.kind == "pin" and not mark.trouble for mark in self.state.marks.value)
-        if form.needs_pins and not has_pins:
+        if form.needs_pins and not self._pixels:
             return "Pin a pixel first"
-        if form.needs_spectra and not (result is not None and result.has_spectra):
+        if form.needs_spectra and not self.result.has_spectra:
             return "This result has depth only"
         return ""
 
@@ -51,22 +58,16 @@ class ExportController:
 
     def taken(self, targets: dict[str, Path]) -> list[Path]:
         """Files that an export would replace."""
-        result = self.state.result.value
-        if result is None:
-            return []
-        return [path for path in expected_files(targets, result, picture_choice(self.state)) if there(path)]
+        return [path for path in expected_files(targets, self.result, self._choice) if there(path)]
 
     def write(self, targets: dict[str, Path], overwrite: bool) -> None:
         """Write the result to a path per format key.
 
-        Tables hold the pins; pictures show the current bands, light and contrast.
+        Tables hold the pins; pictures show the bands, light and contrast of then.
         """
-        state, result = self.state, self.state.result.value
-        if result is None or not targets:
+        if not targets:
             return
-        pins = [mark.pixel for mark in state.marks.value if mark.pixel and not mark.trouble]
-        pixels = [result.in_picture(pin) for pin in pins]
-        look = {**picture_choice(state), **picture_look(state)}
+        result, look = self.result, {**self._choice, **self._look}
 
         def work(progress: Progress) -> list[Path]:
             from dsl_core.io.export import export_csv, export_png, formats
@@ -74,7 +75,7 @@ class ExportController:
 
             exporters: dict[str, Exporter] = {
                 **{form.key: form.write for form in formats().values()},
-                "csv": partial(export_csv, pixels=pixels),
+                "csv": partial(export_csv, pixels=self._pixels),
                 "png": partial(export_png, **look),
             }
             data, written = load_result(result.path), []

@@ -22,18 +22,17 @@ from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
-from dsl_core.io.result.result_arrays import ResultArrays
 
 
 class ExportDialog(QDialog):
     """Asks for formats, folder and name; the controller writes."""
 
-    def __init__(self, result: ResultArrays, control: ExportController, parent: QWidget) -> None:
+    def __init__(self, control: ExportController, parent: QWidget) -> None:
         # What writes files is imported when somebody wants to.
         from dsl_core.io.export import formats
 
         super().__init__(parent)
-        self._control = control
+        self._control, result = control, control.result
         self._offered = [form for form in formats().values() if form.listed]
         self.setWindowTitle("Export")
         self.resize(560, 360)

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,13 @@ from dsl_app.shared.notify import Notifier
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.evaluation.marks import runs_of
+from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.spectra.reference_file import Reference, ReferenceFile, read_references
 from dsl_core.progress import Progress
 from dsl_core.words import counted
+
+if TYPE_CHECKING:
+    from dsl_core.io.export.spectra import NamedSpectrum
 
 Mask = NDArray[np.bool_]
 
@@ -199,9 +204,9 @@ class MarksController:
 
     # Copy and export -------------------------------------------------------------------------------
 
-    def can_export(self) -> bool:
-        """Whether a spectrum is shown that can be copied or exported; if not, says what to do."""
-        found = bool(shown_spectra(self.state.marks.value, self.state.result.value))
+    def shown(self) -> list[NamedSpectrum]:
+        """The spectra that can be copied or exported; if there are none, says what to do."""
+        found = shown_spectra(self.state.marks.value, self.state.result.value)
         if not found:
             self._notifier.tell("info", "No spectrum is ticked. Pin a pixel, draw a region, or tick one.")
         return found
@@ -210,20 +215,17 @@ class MarksController:
         """Pass the spectra shown to ``put``, as a tab-separated table."""
         from dsl_core.io.export.spectra import spectra_as_text
 
-        if self.can_export():
-            spectra = shown_spectra(self.state.marks.value, self.state.result.value)
+        if spectra := self.shown():
             put(spectra_as_text(spectra))
             self._notifier.tell(
                 "info",
                 f"Copied {counted(len(spectra), 'spectrum', 'spectra')}. Paste them into a spreadsheet.",
             )
 
-    def export_spectra(self, path: Path, overwrite: bool) -> None:
-        """Write the spectra shown as CSV."""
-        result = self.state.result.value
-        if result is None or not self.can_export():
-            return
-        spectra = shown_spectra(self.state.marks.value, self.state.result.value)
+    def export_spectra(
+        self, result: ResultArrays, spectra: list[NamedSpectrum], path: Path, overwrite: bool
+    ) -> None:
+        """Write spectra of a result as CSV."""
 
         def work(progress: Progress) -> Path:
             from dsl_core.io.export.spectra import export_spectra

@@ -149,13 +149,14 @@ class MarksPanel(QWidget):
 
     def export_spectra(self) -> None:
         """Ask for a file and write the spectra shown."""
-        result = self._state.result.value
-        if result is None or not self._control.can_export():
+        # Another result may be opened while a person chooses.
+        result, spectra = self._state.result.value, self._control.shown()
+        if result is None or not spectra:
             return
         draft = str(folder_for(result.path) / f"{result.path.stem}_spectra.csv")
         target = ask_target(self, "Export spectra", draft, "Spectra (*.csv)")
         if target is not None:
-            self._control.export_spectra(target[0], overwrite=target[1])
+            self._control.export_spectra(result, spectra, *target)
 
     def _fill(self) -> None:
         """Change only the rows that differ: if all were replaced, each pin would take longer than the last.

@@ -23,7 +23,7 @@ from dsl_core.analysis import classes
 from dsl_core.analysis.classify import ClassMap, Limits, Measure
 from tests.app.support.results_bench import Bench as Window
 from tests.app.support.results_bench import bench as window
-from tests.app.support.results_controller import SQUARE, Bench
+from tests.app.support.results_controller import SQUARE, Bench, opened
 from tests.app.support.results_controller import bench as bench
 from tests.app.support.small_result import BLUE, NM, RED
 
@@ -150,23 +150,23 @@ def test_a_map_of_other_classes_never_stands_for_an_answer_that_failed(bench: Be
 def test_the_map_is_written(bench: Bench, tmp_path: Path) -> None:
     bench.control.marks.pin((30, 5))
     bench.control.answers.from_marks(ANGLE)
-    bench.control.answers.write(tmp_path / "map.hdr")
+    bench.control.answers.write(opened(bench.state), _shown(bench), tmp_path / "map.hdr")
     assert (tmp_path / "map.img").stat().st_size == _shown(bench).found.shown.values.size
-    bench.control.answers.write(tmp_path / "map.hdr")
+    bench.control.answers.write(opened(bench.state), _shown(bench), tmp_path / "map.hdr")
     assert "already exists" in bench.told
 
 
 def test_a_report_that_was_written_can_be_opened(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, opened = tmp_path / "report.html", list[Path]()
+    path, files = tmp_path / "report.html", list[Path]()
     monkeypatch.setattr("dsl_core.analysis.session_report.session_content", lambda *_: None)
     monkeypatch.setattr("dsl_core.analysis.session_report.write_report", lambda *_, **__: path)
-    bench.state.opened.connect(opened.append)
-    bench.control.answers.write_report(path)
+    bench.state.opened.connect(files.append)
+    bench.control.answers.write_report(opened(bench.state), None, path)
     assert bench.told == "The report is saved in report.html."
     bench.notifier.offers["Open the report"]()
-    assert opened == [path]
+    assert files == [path]
 
 
 def test_another_result_has_no_materials(bench: Bench) -> None:
@@ -360,8 +360,8 @@ def test_a_class_has_the_colour_of_its_mark_wherever_it_is_shown(
             assert cell.text() == name
             assert cell.icon().pixmap(14, 14).toImage().pixelColor(7, 7).name() == theme.pin(index)
             assert theme.pin(index) in [spot.brush().color().name() for spot in image.pins.points()]
-    control.answers.write(tmp_path / "map.csv")
-    control.answers.write(tmp_path / "map.hdr")
+    control.answers.write(opened(state), materials, tmp_path / "map.csv")
+    control.answers.write(opened(state), materials, tmp_path / "map.hdr")
     lines = (tmp_path / "map.csv").read_text().splitlines()
     for name, index in names.items():
         assert any(row[:2] == [name, LIGHT.pin(index)] for row in csv.reader(lines))

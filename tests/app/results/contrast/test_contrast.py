@@ -18,6 +18,7 @@ from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
 from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.results_bench import Bench, move
 from tests.app.support.results_bench import bench as bench
+from tests.app.support.results_controller import exports
 from tests.app.support.small_result import BLUE, DARK, RED, write_small_result
 
 
@@ -129,7 +130,7 @@ def test_contrast_is_dragged_with_the_mouse_kept_exported_and_reset(bench: Bench
     assert low == 0
     assert high == pytest.approx(0.4, abs=0.03)
     assert panel.high.value() == pytest.approx(high, abs=1e-3)
-    bench.control.export.write({"png": tmp_path / "a.png"}, overwrite=False)
+    exports(bench.control).write({"png": tmp_path / "a.png"}, overwrite=False)
     exported = np.asarray(cv2.imread(str(next(tmp_path.glob("a_*nm.png")))))
     shown = bench.page.image.content.image
     assert shown.levels.tolist() == [low, high]
@@ -146,7 +147,7 @@ def test_three_bands_are_exported_as_they_are_shown(bench: Bench, tmp_path: Path
     assert [box.currentText() for box in bench.page.bar.bands] == ["650 nm", "550 nm", "450 nm"]
     bench.page.bar.bands[2].activated.emit(46)
     assert not bench.page.bar.light.isVisible()
-    bench.control.export.write({"png": tmp_path / "a.png"}, overwrite=False)
+    exports(bench.control).write({"png": tmp_path / "a.png"}, overwrite=False)
     exported = np.asarray(cv2.imread(str(tmp_path / "a_650_550_660nm.png")))[..., ::-1]
     shown = bench.page.image.content.image.image
     np.testing.assert_allclose(

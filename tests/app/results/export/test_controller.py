@@ -11,7 +11,7 @@ from dsl_app.results.state import ResultView
 
 from dsl_core.io.export import formats
 from dsl_core.io.result.result_file import load_result, save_result
-from tests.app.support.results_controller import Bench
+from tests.app.support.results_controller import Bench, exports
 from tests.app.support.results_controller import bench as bench
 from tests.app.support.small_result import write_small_result
 
@@ -26,13 +26,13 @@ def test_export_says_what_it_wrote_and_replaces_nothing_unasked(bench: Bench, tm
         "tiff": tmp_path / "a.tiff",
         "obj": tmp_path / "a.obj",
     }
-    assert bench.control.export.taken(targets) == []
-    bench.control.export.write(targets, overwrite=False)
+    assert exports(bench.control).taken(targets) == []
+    exports(bench.control).write(targets, overwrite=False)
     assert "Wrote 12 files" in bench.told
-    assert len(bench.control.export.taken(targets)) == 12
-    bench.control.export.write(targets, overwrite=False)
+    assert len(exports(bench.control).taken(targets)) == 12
+    exports(bench.control).write(targets, overwrite=False)
     assert "already exists" in bench.told
-    bench.control.export.write(targets, overwrite=True)
+    exports(bench.control).write(targets, overwrite=True)
     assert "Wrote 12 files" in bench.told
 
 
@@ -42,7 +42,7 @@ def test_pictures_are_exported_as_they_are_shown(bench: Bench, tmp_path: Path) -
     bench.control.step_band(-3)
     bench.control.relight("A", adapted=False)
     bench.state.view.set(ResultView.QUALITY)
-    bench.control.export.write({"png": tmp_path / "a.png"}, overwrite=False)
+    exports(bench.control).write({"png": tmp_path / "a.png"}, overwrite=False)
     files = {path.name: np.asarray(cv2.imread(str(path)))[..., ::-1] for path in tmp_path.glob("a_*.png")}
     assert set(files) == {"a_rgb_A_unadapted.png", "a_depth.png", "a_530nm.png", "a_flags.png"}
     result, picture = bench.state.result.value, bench.state.picture.value
@@ -64,14 +64,14 @@ def test_only_pictures_that_would_be_written_are_in_the_way(tmp_path: Path, name
     targets = {"png": tmp_path / f"{name}.png"}
     for other in ("photo", "2_depth", "rgb_A"):
         (tmp_path / f"{name}_{other}.png").touch()
-    assert bench.control.export.taken(targets) == []
+    assert exports(bench.control).taken(targets) == []
     bench.state.bands.set((0, 1, 2))
-    bench.control.export.write(targets, overwrite=False)
-    written = {path.name for path in bench.control.export.taken(targets)}
+    exports(bench.control).write(targets, overwrite=False)
+    written = {path.name for path in exports(bench.control).taken(targets)}
     parts = ("rgb", "depth", "545nm", "430_435_440nm", "flags")
     assert written == {f"{name}_{part}.png" for part in parts}
     bench.control.relight("A", adapted=True)
-    assert f"{name}_rgb_A.png" in {path.name for path in bench.control.export.taken(targets)}
+    assert f"{name}_rgb_A.png" in {path.name for path in exports(bench.control).taken(targets)}
 
 
 def test_files_of_what_a_result_lacks_are_not_in_the_way(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_files_of_what_a_result_lacks_are_not_in_the_way(tmp_path: Path) -> None
     targets = {form: tmp_path / f"a.{suffix}" for form, suffix in (("tiff", "tiff"), ("envi", "hdr"))}
     for name in ("a_std.tiff", "a_flags.tiff", "a_std.hdr", "a_std.img"):
         (tmp_path / name).touch()
-    assert bench.control.export.taken(targets) == []
+    assert exports(bench.control).taken(targets) == []
 
 
 @pytest.mark.parametrize(
@@ -103,11 +103,11 @@ def test_what_stands_in_the_way_of_an_export_is_said(
     targets = {
         form.key: tmp_path / f"{name}{form.suffix}" for form in formats().values() if form.key in forms
     }
-    found = bench.control.export.trouble(str(tmp_path), name, targets, replace)
+    found = exports(bench.control).trouble(str(tmp_path), name, targets, replace)
     assert found.startswith(trouble)
     assert bool(found) == bool(trouble)
     nowhere = str(tmp_path / "nowhere")
-    assert "not a folder" in bench.control.export.trouble(nowhere, "a", {"ply": tmp_path}, True)
+    assert "not a folder" in exports(bench.control).trouble(nowhere, "a", {"ply": tmp_path}, True)
 
 
 @pytest.mark.parametrize(
@@ -125,6 +125,6 @@ def test_formats_that_lack_spectra_or_pins_are_refused(
     if pinned:
         bench.control.marks.pin((3, 3))
     for form in formats().values():
-        refusal = bench.control.export.refusal(form)
+        refusal = exports(bench.control).refusal(form)
         assert refused.get(form.key, "") in refusal
         assert bool(refusal) == (form.key in refused)

@@ -10,7 +10,7 @@ from dsl_app.shared.undo import Change
 from dsl_app.shell.actions import ACTIONS
 
 from dsl_core.io.result.annotations_file import load_annotations
-from tests.app.support.results_controller import SQUARE, Bench
+from tests.app.support.results_controller import SQUARE, Bench, opened
 from tests.app.support.results_controller import bench as bench
 from tests.app.support.small_result import BLUE, DARK, write_reference, write_small_result
 from tests.io.spectra.test_reference_file import BRICK, write_library
@@ -145,7 +145,7 @@ def test_marks_on_disk_follow_undo(bench: Bench, tmp_path: Path) -> None:
 def test_spectra_are_copied_and_exported_and_read_again_as_references(bench: Bench, tmp_path: Path) -> None:
     marks, copied, path = bench.control.marks, list[str](), tmp_path / "spectra.csv"
     marks.copy_spectra(copied.append)
-    assert (copied, marks.can_export()) == ([], False)
+    assert (copied, marks.shown()) == ([], [])
     assert "No spectrum is ticked" in bench.told
     marks.add_outline(SQUARE)
     marks.pin((3, 3))
@@ -161,13 +161,13 @@ def test_spectra_are_copied_and_exported_and_read_again_as_references(bench: Ben
         "region 1: uncertainty of a pixel (1)",
     ]
     assert float(first[4]) == pytest.approx(0.01)
-    marks.export_spectra(path, overwrite=False)
+    marks.export_spectra(opened(bench.state), marks.shown(), path, overwrite=False)
     assert f"Wrote 1 spectrum to {path}" in bench.told
-    marks.export_spectra(path, overwrite=False)
+    marks.export_spectra(opened(bench.state), marks.shown(), path, overwrite=False)
     assert "already exists" in bench.told
     marks.show(True, bench.state.marks.value[1].key)
     both = tmp_path / "both.csv"
-    marks.export_spectra(both, overwrite=False)
+    marks.export_spectra(opened(bench.state), marks.shown(), both, overwrite=False)
     assert "\n# pin 1: pixel at column 3, row 3, counted from 0\n" in both.read_text(encoding="utf-8")
     assert bench.control.open(path)
     reference = bench.state.marks.value[-1]

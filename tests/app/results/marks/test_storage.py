@@ -17,6 +17,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.result.annotations_file import Annotations, load_annotations, save_annotations
 from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.doubles import InlineRunner, RecordingNotifier, WaitingRunner
+from tests.app.support.results_controller import exports
 from tests.app.support.small_result import BLUE, DARK, write_reference, write_small_result
 
 MARKS = "small.marks.json"
@@ -204,7 +205,7 @@ def test_marks_of_spectra_survive_a_result_without(path: Path, tmp_path: Path) -
     bench.runner.run()
     assert annotations_of(bench.state.marks.value) == kept
     assert all(mark.trouble for mark in bench.state.marks.value)
-    assert bench.control.export.taken({"csv": tmp_path / "none.csv"}) == []
+    assert exports(bench.control).taken({"csv": tmp_path / "none.csv"}) == []
 
 
 def test_marks_of_one_name_are_told_apart_without_their_arrays() -> None:
