@@ -127,7 +127,9 @@ def _is_beside(file: Path) -> bool:
 
 def _entries(file: Path, note: Callable[[str], None]) -> list[tuple[str, SpectralCurve]]:
     kind = format_of(file)
-    spectra, as_percent = shares_of(file, kind.read(file))
+    spectra, as_percent, notes = shares_of(file, kind.read(file))
+    for each in notes:
+        note(f"{file.name}: {each}")
     if as_percent is not None:
         note(f"{file.name}: values up to {as_percent:.3g} are read as percent.")
     if len(spectra) == 1 and (not kind.is_named or BY_PLACE.fullmatch(spectra[0].name)):

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.io.spectra.catalogue import read_spectra
-from dsl_core.io.spectra.spectrum_file import of_kind
+from dsl_core.io.spectra.reference_file import shares_of
+from dsl_core.io.spectra.spectrum_file import as_radiance, of_kind
 
 NM = np.arange(400.0, 701.0, 10.0)
 SHARE = 0.2 + 0.5 * np.exp(-0.5 * ((NM - 560) / 45) ** 2)
@@ -203,6 +204,8 @@ def reader_of(name: str) -> Callable[[Path], object]:
         if "meter" in name:
             # Irradiance is neither radiance nor a share.
             return found
-        return of_kind(path, found, radiance="cs2000" in name, all_unstated=True)
+        if "cs2000" in name:
+            return [as_radiance(path, each) for each in of_kind(path, found, radiance=True)]
+        return shares_of(path, found)
 
     return read

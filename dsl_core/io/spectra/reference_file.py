@@ -10,7 +10,7 @@ import numpy as np
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.catalogue import format_of
 from dsl_core.io.spectra.records import VISIBLE_NM, Floats, Spectrum
-from dsl_core.io.spectra.spectrum_file import of_kind
+from dsl_core.io.spectra.spectrum_file import MOST_SHARE, as_share, is_percent, of_kind
 from dsl_core.model.spectral import SpectralCurve
 
 #: Fewer values make no spectrum.
@@ -31,40 +31,44 @@ class Reference:
 class ReferenceFile:
     """The spectra of a file, and the names of those without values.
 
-    ``as_percent`` is the largest value (%) of a file that states no unit, where that made it percent.
+    ``as_percent`` is the largest value (%) of a file that states no unit, where that made it percent;
+    ``notes`` are sentences on what else was made of the file.
     """
 
     references: tuple[Reference, ...]
     empty: tuple[str, ...] = ()
     as_percent: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 def read_references(path: Path) -> ReferenceFile:
     """All reflectances of a file, whatever range they cover; raises `CalibrationError`."""
     kind = format_of(path)
-    spectra, as_percent = shares_of(path, kind.read(path))
+    spectra, as_percent, notes = shares_of(path, kind.read(path))
     if len(spectra) == 1 and not kind.is_named:
         spectra = [replace(spectra[0], name="")]
-    return replace(as_references(path, spectra), as_percent=as_percent)
+    return replace(as_references(path, spectra), as_percent=as_percent, notes=notes)
 
 
-def shares_of(path: Path, raw: list[Spectrum]) -> tuple[list[Spectrum], float | None]:
-    """The spectra of a file as shares, and the largest value (%) if they had to be guessed to be percent.
+def shares_of(path: Path, raw: list[Spectrum]) -> tuple[list[Spectrum], float | None, tuple[str, ...]]:
+    """The spectra of a file as shares, the largest value (%) if they were guessed to be percent, and notes.
 
     A dark spectrum in percent looks like a share; others of its file tell. Raises `CalibrationError`.
     """
-    spectra, as_read = of_kind(path, raw, radiance=False, all_unstated=True), {id(each) for each in raw}
-    percent = [each for each in spectra if id(each) not in as_read]
-    if not percent:
-        return spectra, None
-    most = 100 * max(float(np.nanmax(each.values, initial=0.0)) for each in percent)
-    shares = [
-        Spectrum(each.name, each.nm, each.values * 0.01, each.quantity, True)
-        if id(each) in as_read and not each.scaled
-        else each
-        for each in spectra
-    ]
-    return shares, most
+    found = of_kind(path, raw, radiance=False, all_unstated=True)
+    spectra, notes = [as_share(path, each) for each in found], list[str]()
+    kept = {id(each) for each in found}
+    if beside := [each.name for each in raw if each.quantity == "unstated" and id(each) not in kept]:
+        notes.append(f"left out, as values above {MOST_SHARE:g} are no share: {', '.join(beside[:5])}.")
+    percent = [float(np.nanmax(each.values, initial=0.0)) for each in found if is_percent(each)]
+    if percent:
+        spectra = [
+            share
+            if each.scaled or is_percent(each)
+            else replace(share, values=share.values * 0.01, scaled=True)
+            for each, share in zip(found, spectra, strict=True)
+        ]
+    return spectra, max(percent, default=None), tuple(notes)
 
 
 def read_reference(path: Path, name: str = "") -> SpectralCurve:

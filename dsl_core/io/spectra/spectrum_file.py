@@ -48,38 +48,46 @@ def read_radiances(path: Path, covers_nm: tuple[float, float] = (430.0, 660.0)) 
 def of_kind(
     path: Path, spectra: list[Spectrum], radiance: bool, all_unstated: bool = False
 ) -> list[Spectrum]:
-    """The spectra that are radiance, or shares: those that say so, else those that say nothing.
+    """The spectra, as read, that are radiance, or shares: those that say so, else those that say nothing.
 
-    ``all_unstated`` takes both. Values become W/(sr m2 nm) or shares. Raises `CalibrationError` when there is
-    none.
+    ``all_unstated`` takes both, but no percentages next to shares that say so: they are figures of another
+    kind, such as gloss. Raises `CalibrationError` when there is none.
     """
     wanted: tuple[Quantity, ...] = ("radiance",) if radiance else ("reflectance", "transmittance")
     stated = [each for each in spectra if each.quantity in wanted]
-    if all_unstated:
-        wanted = (*wanted, "unstated")
-    found = [each for each in spectra if each.quantity in wanted] if stated else []
-    found = found or [each for each in spectra if each.quantity == "unstated"]
+    found = stated or [each for each in spectra if each.quantity == "unstated"]
+    if stated and all_unstated:
+        wanted, are_percent = (*wanted, "unstated"), any(map(is_percent, stated))
+        known = [each for each in spectra if each.quantity in wanted]
+        found = [each for each in known if each.quantity != "unstated" or are_percent or not is_percent(each)]
     if not found:
         kinds = sorted({_CALLED.get(each.quantity, each.quantity) for each in spectra})
         needed = f"a spectral radiance. Export radiance in {RADIANCE_UNIT}" if radiance else "a reflectance"
         way = "" if radiance else ". Divide it by the spectrum of a white standard, or export reflectance"
         raise CalibrationError(f"{path.name} contains {' and '.join(kinds)}, not {needed}{way}.")
-    return [_as_radiance(path, each) if radiance else _as_share(path, each) for each in found]
+    return found
 
 
-def _as_share(path: Path, spectrum: Spectrum) -> Spectrum:
+def is_percent(spectrum: Spectrum) -> bool:
+    """Whether a spectrum without a unit is too large for shares of light."""
+    return not spectrum.scaled and most_of(spectrum.nm, spectrum.values) > MOST_SHARE
+
+
+def as_share(path: Path, spectrum: Spectrum) -> Spectrum:
+    """A spectrum as shares of light; raises `CalibrationError` for one that can only be counts."""
     most = most_of(spectrum.nm, spectrum.values)
     if most > 100 * MOST_SHARE:
         raise CalibrationError(
             f"{path.name} contains values up to {most:g}; reflectance from 0 to 1, or percent, is needed."
             " Divide it by the spectrum of a white standard, or export reflectance."
         )
-    if spectrum.scaled or most <= MOST_SHARE:
+    if not is_percent(spectrum):
         return spectrum
     return Spectrum(spectrum.name, spectrum.nm, spectrum.values * 0.01, spectrum.quantity, True)
 
 
-def _as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
+def as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
+    """A spectrum, if it can be radiance; raises `CalibrationError` otherwise."""
     most = most_of(spectrum.nm, spectrum.values)
     if most > (_MOST_RADIANCE if spectrum.scaled else _MOST_UNSTATED):
         stated = RADIANCE_UNIT if spectrum.scaled else "no stated unit"
@@ -91,6 +99,7 @@ def _as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
 
 
 def _curve(path: Path, spectrum: Spectrum, covers_nm: tuple[float, float], radiance: bool) -> SpectralCurve:
+    spectrum = as_radiance(path, spectrum) if radiance else as_share(path, spectrum)
     _require_range(path, spectrum.nm, covers_nm)
     missing = ~np.isfinite(spectrum.values)
     if missing.any():

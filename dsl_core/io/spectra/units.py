@@ -37,12 +37,13 @@ _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
 #: Words for columns that hold no spectrum of their own, wherever they stand in a title.
 _BESIDE = re.compile(
     r"deviation|abweichung|uncertain|unsicherheit|variance|λ|wave ?(?:len|num)|wvl|wellenl"
-    r"|\b(?:std ?(?:dev)?|st\. ?dev|errors?|sd|sem|flags?|wave|lambda)\b",
+    r"|\b(?:std ?(?:dev)?|st\. ?dev|errors?|sd|sem|flags?|wave|lambda|snr|fwhm|band ?widths?)\b",
     re.IGNORECASE,
 )
 #: Words that say so where they are all of the title: "pixel 3" and "No. 2 blue" are spectra.
 _COUNTER = re.compile(
-    r"\W*(?:pixels?|chan(?:nels?)?|index|n[or]|id|row|zeile|#)?(?: ?(?:n[or]|number|index))?\W*",
+    r"\W*(?:pixels?|chan(?:nels?)?|index|n[or]|id|row|zeile|#|cv|gloss|quality|detector)?"
+    r"(?: ?(?:n[or]|number|index))?(?:(?<=\w) ?[\[(][^\])]*[\])])?\W*",
     re.IGNORECASE,
 )
 #: Where words of a title meet that are written together: "refl_std", "leafStd".
@@ -52,7 +53,7 @@ _MEETING = re.compile(r"_|(?<=[a-z])(?=[A-Z])")
 def is_beside(title: str) -> bool:
     """Whether a column's title says that it is no spectrum: a deviation, a pixel number, wavelengths.
 
-    >>> is_beside("leaf_std"), is_beside("Channel"), is_beside("camouflage"), is_beside("No. 1 red")
+    >>> is_beside("leaf_std"), is_beside("CV (%)"), is_beside("camouflage"), is_beside("No. 1 red")
     (True, True, False, False)
     """
     words = _MEETING.sub(" ", title)
@@ -60,7 +61,9 @@ def is_beside(title: str) -> bool:
 
 
 def counts_rows(title: str, values: Floats) -> bool:
-    """Whether a column without a title only counts its rows, as tables of data frames do."""
+    """Whether a column counts its rows without a title, as tables of data frames do, or readings as "n"."""
+    if title.strip().lower() == "n":
+        return bool(np.all(values[np.isfinite(values)] % 1 == 0))
     return not title.strip() and values.size > 1 and bool(np.all(np.diff(values) == 1))
 
 

@@ -195,3 +195,45 @@ def test_a_row_of_rising_or_falling_values_is_no_line_of_wavelengths(tmp_path: P
     found = read_columns(table(tmp_path / "counts.csv", titles, NM / 1000, *columns))
     assert len(found) == 12
     np.testing.assert_allclose(found[0].nm, NM)
+
+
+@pytest.mark.parametrize(
+    "titles",
+    [
+        "nm,reflectance,SNR",
+        "nm,R,n",
+        "nm,R,CV (%)",
+        "nm,mean,FWHM (nm)",
+        "n,nm,R",
+        "nm,R,bandwidth",
+        "nm,R,Gloss",
+    ],
+)
+def test_a_column_of_other_figures_does_not_make_shares_percent(tmp_path: Path, titles: str) -> None:
+    given = {"nm": NM, "n": np.arange(NM.size) + 5}
+    columns = [
+        given.get(title, LEAF if title in ("R", "mean", "reflectance") else LEAF * 0 + 150)
+        for title in titles.split(",")
+    ]
+    found = read_references(table(tmp_path / "leaf.csv", titles, *columns))
+    assert found.as_percent is None
+    assert len(found.references) == 1
+    np.testing.assert_allclose(found.references[0].curve.values, LEAF, rtol=1e-5)
+    assert found.notes == ()
+
+
+def test_a_figure_beside_reflectance_is_left_out_and_told_unless_it_can_be_one(tmp_path: Path) -> None:
+    path = table(tmp_path / "a.csv", "nm,reflectance,bark,steps", NM, LEAF, LEAF / 2, LEAF + 400)
+    found = read_references(path)
+    assert [each.name for each in found.references] == ["reflectance", "bark"]
+    np.testing.assert_allclose(found.references[0].curve.values, LEAF, rtol=1e-5)
+    assert found.notes == ("left out, as values above 2 are no share: steps.",)
+    path = table(path, "nm,reflectance,bark", NM, LEAF * 100, LEAF * 50)
+    found = read_references(path)
+    assert found.notes == ()
+    np.testing.assert_allclose(found.references[1].curve.values, LEAF / 2, rtol=1e-5)
+
+
+def test_letters_of_samples_are_names(tmp_path: Path) -> None:
+    found = read_columns(table(tmp_path / "a.csv", "nm,m,n", NM, LEAF, LEAF))
+    assert [each.name for each in found] == ["m", "n"]

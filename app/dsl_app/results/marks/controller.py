@@ -74,6 +74,8 @@ class MarksController:
         def done(content: ReferenceFile) -> None:
             if self.state.result.value is not result:
                 return
+            for note in content.notes:
+                self._notifier.tell("info", f"{path.name}: {note}")
             if content.as_percent is not None:
                 most = content.as_percent
                 self._notifier.tell(
