@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.reading import read_bounded, require_plain
-from dsl_core.io.spectra.records import most_of
+from dsl_core.io.spectra.records import MOST_NUMBER, most_of
 
 Floats = NDArray[np.float64]
 LIBRARY = "envi spectral library"
@@ -35,8 +35,6 @@ _NANOMETRES |= dict.fromkeys(("microns", "micron"), 1e3)
 _FIELD = re.compile(r"^([^=;{}\n]+)=[ \t]*(\{[^{}]*\}|[^\n]*)", re.MULTILINE)
 #: Digits of a whole number, and values of a library, that no instrument reaches.
 _MOST_DIGITS, _MOST_VALUES = 12, 100_000_000
-#: Below this no instrument measures: such values mark what was deleted, as -1.23e34 does in many libraries.
-DELETED_BELOW = -1e30
 #: Reflectance above this can only be a percentage, above a hundred times this only a count of unstated scale.
 MOST = 2.0
 
@@ -187,11 +185,12 @@ def _is_good(path: Path, header: Mapping[str, str], bands: int) -> NDArray[np.bo
 
 def _reflectance(path: Path, header: Mapping[str, str], nm: Floats, values: Floats) -> Floats:
     """Values as shares of light; NaN for what the header or an absurd number marks as deleted."""
-    deleted = ~np.isfinite(values) | (values < DELETED_BELOW)
+    deleted = ~(np.abs(values) < MOST_NUMBER)
     try:
         scale = float(header.get("reflectance scale factor", 1.0))
         if "data ignore value" in header:
-            deleted |= values == np.float64(header["data ignore value"])
+            # Data in 32 bits has not all digits of the header.
+            deleted |= np.isclose(values, float(header["data ignore value"]), rtol=1e-6, atol=0.0)
     except ValueError as error:
         raise CalibrationError(
             f"{path.name}: the scale factor or ignore value is not a number ({error}). Correct the header."

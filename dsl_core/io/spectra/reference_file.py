@@ -10,7 +10,7 @@ import numpy as np
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.catalogue import format_of
 from dsl_core.io.spectra.records import VISIBLE_NM, Floats, Spectrum
-from dsl_core.io.spectra.spectrum_file import MOST_SHARE, as_share, is_percent, of_kind
+from dsl_core.io.spectra.spectrum_file import LEAST_SHARE, MOST_SHARE, as_share, is_percent, of_kind
 from dsl_core.model.spectral import SpectralCurve
 
 #: Fewer values make no spectrum.
@@ -56,18 +56,14 @@ def shares_of(path: Path, raw: list[Spectrum]) -> tuple[list[Spectrum], float | 
     A dark spectrum in percent looks like a share; others of its file tell. Raises `CalibrationError`.
     """
     found = of_kind(path, raw, radiance=False, all_unstated=True)
-    spectra, notes = [as_share(path, each) for each in found], list[str]()
-    kept = {id(each) for each in found}
+    percent = [float(np.nanmax(each.values, initial=0.0)) for each in found if is_percent(each)]
+    spectra, kept = [as_share(path, each, bool(percent)) for each in found], {id(each) for each in found}
+    notes = []
     if beside := [each.name for each in raw if each.quantity == "unstated" and id(each) not in kept]:
         notes.append(f"left out, as values above {MOST_SHARE:g} are no share: {', '.join(beside[:5])}.")
-    percent = [float(np.nanmax(each.values, initial=0.0)) for each in found if is_percent(each)]
-    if percent:
-        spectra = [
-            share
-            if each.scaled or is_percent(each)
-            else replace(share, values=share.values * 0.01, scaled=True)
-            for each, share in zip(found, spectra, strict=True)
-        ]
+    before, after = (sum(int(np.isnan(s.values).sum()) for s in group) for group in (found, spectra))
+    if deleted := after - before:
+        notes.append(f"values below {LEAST_SHARE:g} are taken as deleted: {deleted}.")
     return spectra, max(percent, default=None), tuple(notes)
 
 

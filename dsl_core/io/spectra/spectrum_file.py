@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from dsl_core.model.spectral import SpectralCurve
 RADIANCE_UNIT = "W/(sr m2 nm)"
 #: Shares above this can only be percentages, above a hundred times this only counts.
 MOST_SHARE = 2.0
+#: No share is so far below zero: -9999, -999 and the like mark what was deleted, also over a scale factor.
+LEAST_SHARE = -0.9
 #: Radiance without a stated unit above this is something else; with one, above what the Sun's disc has.
 _MOST_UNSTATED, _MOST_RADIANCE = 100.0, 1e5
 _CALLED: dict[Quantity, str] = {"reflectance": "reflectance (a share or percent)", "counts": "counts"}
@@ -73,21 +76,25 @@ def is_percent(spectrum: Spectrum) -> bool:
     return not spectrum.scaled and most_of(spectrum.nm, spectrum.values) > MOST_SHARE
 
 
-def as_share(path: Path, spectrum: Spectrum) -> Spectrum:
-    """A spectrum as shares of light; raises `CalibrationError` for one that can only be counts."""
+def as_share(path: Path, spectrum: Spectrum, in_percent: bool = False) -> Spectrum:
+    """A spectrum as shares of light, NaN where a value was deleted; ``in_percent`` unless it has a unit.
+
+    Raises `CalibrationError` for one that can only be counts.
+    """
     most = most_of(spectrum.nm, spectrum.values)
     if most > 100 * MOST_SHARE:
         raise CalibrationError(
             f"{path.name} contains values up to {most:g}; reflectance from 0 to 1, or percent, is needed."
             " Divide it by the spectrum of a white standard, or export reflectance."
         )
-    if not is_percent(spectrum):
-        return spectrum
-    return Spectrum(spectrum.name, spectrum.nm, spectrum.values * 0.01, spectrum.quantity, True)
+    percent = is_percent(spectrum) or (in_percent and not spectrum.scaled)
+    values = spectrum.values * (0.01 if percent else 1.0)
+    values[values < LEAST_SHARE] = np.nan
+    return replace(spectrum, values=values, scaled=spectrum.scaled or percent)
 
 
 def as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
-    """A spectrum, if it can be radiance; raises `CalibrationError` otherwise."""
+    """A spectrum, if it can be radiance, NaN where a value was deleted; raises `CalibrationError` if not."""
     most = most_of(spectrum.nm, spectrum.values)
     if most > (_MOST_RADIANCE if spectrum.scaled else _MOST_UNSTATED):
         stated = RADIANCE_UNIT if spectrum.scaled else "no stated unit"
@@ -95,7 +102,8 @@ def as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
             f"{path.name} contains values up to {most:g} in {stated}; a spectral radiance is not so large."
             f" Export radiance in {RADIANCE_UNIT}, with its unit over the column."
         )
-    return spectrum
+    # In any unit, noise is not so far below zero, but -9999 is.
+    return replace(spectrum, values=np.where(spectrum.values < -10 * most, np.nan, spectrum.values))
 
 
 def _curve(path: Path, spectrum: Spectrum, covers_nm: tuple[float, float], radiance: bool) -> SpectralCurve:

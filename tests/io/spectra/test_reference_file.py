@@ -98,6 +98,52 @@ def test_deleted_values_are_neither_shown_nor_bridged(tmp_path: Path) -> None:
         read_references(path)
 
 
+@pytest.mark.parametrize("ignored", [-9999.9, -99.99, -0.001, 1.23e36, 3.4028235e38])
+def test_deleted_values_in_32_bits_are_those_of_a_decimal_header(tmp_path: Path, ignored: float) -> None:
+    path = write_library(tmp_path / "a.sli", {"data ignore value": ignored})
+    values = np.stack([GRASS, BRICK]).astype("<f4")
+    values[0, -4:] = ignored
+    path.write_bytes(values.tobytes())
+    np.testing.assert_array_equal(read_reference(path, "Grass").wavelengths_nm, NM[:-4])
+    np.testing.assert_array_equal(read_reference(path, "Brick").wavelengths_nm, NM)
+
+
+@pytest.mark.parametrize("marker", [-9999.0, -999.0, -99.0])
+@pytest.mark.parametrize("scale", [1.0, 100.0])
+def test_numbers_that_mark_deleted_values_are_no_reflectance(
+    tmp_path: Path, marker: float, scale: float
+) -> None:
+    values = BRICK * scale
+    values[[3, -1]] = marker
+    path = tmp_path / "a.csv"
+    rows = (f"{nm:g},{value:g}" for nm, value in zip(NM, values, strict=True))
+    path.write_text("\n".join(["nm,reflectance", *rows]))
+    found = read_references(path)
+    curve = found.references[0].curve
+    np.testing.assert_array_equal(curve.wavelengths_nm, np.delete(NM, [3, NM.size - 1]))
+    np.testing.assert_allclose(curve.values, np.delete(BRICK, [3, NM.size - 1]), rtol=1e-5)
+    assert found.notes == ("values below -0.9 are taken as deleted: 2.",)
+
+
+def test_whole_numbers_over_a_scale_factor_mark_deleted_values_too(tmp_path: Path) -> None:
+    path = write_library(tmp_path / "a.sli", {"data type": 2, "reflectance scale factor": 10000})
+    values = (np.stack([GRASS, BRICK]) * 10000).astype("<i2")
+    values[0, -1] = -9999
+    path.write_bytes(values.tobytes())
+    found = read_references(path)
+    np.testing.assert_array_equal(found.references[0].curve.wavelengths_nm, NM[:-1])
+    assert found.notes == ("values below -0.9 are taken as deleted: 1.",)
+
+
+def test_noise_about_zero_of_a_dark_spectrum_in_percent_stays(tmp_path: Path) -> None:
+    path = tmp_path / "two.csv"
+    rows = (f"{nm},90,{-1.2 if nm == 400 else 1.5}" for nm in range(400, 701, 10))
+    path.write_text("\n".join(["nm,white,black", *rows]))
+    found = read_references(path)
+    assert found.references[1].curve.values[:2] == pytest.approx((-0.012, 0.015))
+    assert found.notes == ()
+
+
 def test_noise_beyond_the_visible_says_nothing_of_the_scale_of_a_library(tmp_path: Path) -> None:
     nm = np.arange(350.0, 2501.0, 10.0)
     listed = {"wavelength": "{" + ",".join(f"{each:g}" for each in nm) + "}", "samples": nm.size}

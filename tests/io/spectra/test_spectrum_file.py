@@ -136,3 +136,16 @@ def test_shares_above_two_can_only_be_percent(tmp_path: Path, largest: float, fo
     path = tmp_path / "a.csv"
     path.write_text(text, encoding="utf-8")
     assert max(read_spectrum(path, radiance=False).values) == pytest.approx(found)
+
+
+def test_a_deleted_radiance_is_missing_and_noise_about_zero_is_not(tmp_path: Path) -> None:
+    nm = range(400, 701, 5)
+    path = tmp_path / "lamp.csv"
+    for value, is_kept in ((-9999.0, False), (-0.002, True)):
+        rows = (f"{each},{value if each == 500 else 0.01}" for each in nm)
+        path.write_text("\n".join(["nm,radiance (W/(sr m2 nm))", *rows]))
+        if is_kept:
+            assert min(read_spectrum(path).values) == value
+        else:
+            with pytest.raises(CalibrationError, match="has no value at 500 nm"):
+                read_spectrum(path)
