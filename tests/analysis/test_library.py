@@ -63,6 +63,15 @@ def test_percent_is_told_and_dark_spectra_of_such_a_file_are_percent_too(tmp_pat
     assert "read as percent" in library.notes[0]
 
 
+def test_what_else_was_made_of_a_file_is_told(tmp_path: Path) -> None:
+    values = np.where(NM == NM[-1], -9999.0, SHARE)
+    _csv(tmp_path / "leaf.csv", values, SHARE + 60, titles=("reflectance", "steps"))
+    library = read_library([tmp_path])
+    assert len(library.entries) == 1
+    assert "leaf.csv: left out, as values above 2 are no share: steps." in library.notes
+    assert "leaf.csv: values below -0.9 are taken as deleted: 1." in library.notes
+
+
 def test_two_hundred_entries_of_one_name_are_one_class_that_varies(tmp_path: Path) -> None:
     levels = np.linspace(0.8, 1.2, 200)
     _csv(tmp_path / "l.csv", *(SHARE * level for level in levels), titles=("leaf",) * 200)

@@ -28,9 +28,14 @@ _UNIT_LINE = re.compile(r"\W*(?:y[- ]?)?units?\b", re.IGNORECASE)
 #: In the order in which they are tried; a unit of power decides before all of them.
 _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
     ("irradiance", re.compile(r"irrad|\birr\b", re.IGNORECASE)),
-    ("absorbance", re.compile(r"absorb|log ?\(1/R\)", re.IGNORECASE)),
+    ("absorbance", re.compile(r"absorb|log ?\(1/R\)|kubelka|K/S\b", re.IGNORECASE)),
     ("transmittance", re.compile(r"transmi", re.IGNORECASE)),
     ("reflectance", re.compile(r"reflect|reflekt|remission|albedo", re.IGNORECASE)),
+    # Of reflectance, absorption may be said in passing; short forms may be names of samples, such as of ABS.
+    (
+        "absorbance",
+        re.compile(r"(?i:absorp|extin[ck]t|optical dens|optische dichte)|^\W*(?:Abs|OD)\b[^\w]*$"),
+    ),
     ("counts", re.compile(r"\bcounts?\b|\bDN\b|\bscope\b|digital number", re.IGNORECASE)),
     ("radiance", re.compile(r"radiance|strahldichte|\brad\b", re.IGNORECASE)),
 )

@@ -237,3 +237,29 @@ def test_a_figure_beside_reflectance_is_left_out_and_told_unless_it_can_be_one(t
 def test_letters_of_samples_are_names(tmp_path: Path) -> None:
     found = read_columns(table(tmp_path / "a.csv", "nm,m,n", NM, LEAF, LEAF))
     assert [each.name for each in found] == ["m", "n"]
+
+
+@pytest.mark.parametrize(
+    "title",
+    ["Absorbance", "Absorption", "absorption coefficient", "Extinktion", "Extinction", "optical density",
+     "OD", "Abs", "Abs.", "K/S", "Kubelka-Munk"],
+)  # fmt: skip
+def test_absorption_is_no_reflectance(tmp_path: Path, title: str) -> None:
+    with pytest.raises(CalibrationError, match="contains absorbance, not a reflectance"):
+        read_references(table(tmp_path / "a.csv", f"nm,{title}", NM, LEAF))
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        "Reflectance (absorption of the cell removed)",
+        "Abs. reflectance",
+        "ABS white",
+        "ABS",
+        "filter OD 2",
+        "Absinth",
+    ],
+)
+def test_words_like_absorption_do_not_refuse_reflectance(tmp_path: Path, title: str) -> None:
+    path = table(tmp_path / "a.csv", f"nm,{title}", NM, LEAF)
+    np.testing.assert_allclose(read_references(path).references[0].curve.values, LEAF, rtol=1e-4)

@@ -129,6 +129,16 @@ def test_values_without_a_unit_that_are_taken_for_percent_are_told(bench: Bench,
     np.testing.assert_allclose(max(listed.curve.values), np.max(BLUE), atol=1e-6)
 
 
+def test_deleted_values_of_a_reference_are_told(bench: Bench, tmp_path: Path) -> None:
+    values = BLUE.copy()
+    values[-1] = -9999
+    bench.control.marks.add_reference(write_reference(tmp_path / "tile.csv", values))
+    assert "tile.csv: values below -0.9 are taken as deleted: 1." in bench.told
+    (listed,) = bench.state.marks.value
+    assert listed.curve is not None
+    assert min(listed.curve.values) >= 0
+
+
 def test_a_file_without_spectrum_is_told(bench: Bench, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("hello")
     assert bench.control.open(tmp_path / "a.csv")

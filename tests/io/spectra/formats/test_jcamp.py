@@ -120,3 +120,8 @@ def test_two_points_are_a_spectrum_and_blocks_are_read_one_by_one(tmp_path: Path
     assert [(each.name, each.values.tolist()) for each in read_jcamp(two)] == [
         ("grey tile", [0.5, 1.0]), ("white", [1.0, 2.0]),
     ]  # fmt: skip
+
+
+def test_functions_of_absorption_are_called_so(tmp_path: Path) -> None:
+    (found,) = read_jcamp(written(tmp_path, YUNITS="KUBELKA-MUNK"))
+    assert found.quantity == "absorbance"
