@@ -103,7 +103,7 @@ def as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
             f" Export radiance in {RADIANCE_UNIT}, with its unit over the column."
         )
     # In any unit, noise is not so far below zero, but -9999 is.
-    return replace(spectrum, values=np.where(spectrum.values < -10 * most, np.nan, spectrum.values))
+    return replace(spectrum, values=np.where(spectrum.values < -100 * most, np.nan, spectrum.values))
 
 
 def _curve(path: Path, spectrum: Spectrum, covers_nm: tuple[float, float], radiance: bool) -> SpectralCurve:

@@ -289,3 +289,12 @@ def test_a_table_with_bars_around_its_cells_is_read(tmp_path: Path) -> None:
     spectra = read_spectra(write(tmp_path / "report.md.txt", "\n".join([*head, *rows])))
     assert [each.name for each in spectra] == ["Azurite (%)", "Malachite (%)"]
     np.testing.assert_allclose(spectra[1].values, SHARE / 2, atol=1e-6)
+
+
+@pytest.mark.parametrize("said", ["leaf_Reflection__0__.txt", "leaf_Transmission_10-1.txt", "leaf 12 %R"])
+@pytest.mark.parametrize("level", [1.0, 0.01])
+def test_ocean_is_in_percent_however_dark_a_sample_is(tmp_path: Path, said: str, level: float) -> None:
+    path = write(tmp_path / "a.txt", made.ocean(f"Data from {said} Node", 100 * level))
+    found = read_references(path)
+    np.testing.assert_allclose(found.references[0].curve.values, SHARE * level, atol=1e-7)
+    assert found.as_percent is None

@@ -45,10 +45,12 @@ def read_ocean(path: Path) -> list[Spectrum]:
 
 
 def _judged(spectrum: Spectrum, said: str) -> Spectrum:
-    quantity, _, _ = quantity_of(said)
-    most = float(np.nanmax(spectrum.values))
-    if quantity == "unstated" and most > _MOST_PERCENT:
-        return Spectrum("", spectrum.nm, spectrum.values, "counts")
+    quantity, factor, _ = quantity_of(said)
+    if quantity in ("reflectance", "transmittance"):
+        # These programs compute both in percent, of dark samples too; a sample's name may look like a unit.
+        return Spectrum("", spectrum.nm, spectrum.values * (0.01 / factor), quantity, True)
+    if quantity == "unstated" and float(np.nanmax(spectrum.values)) > _MOST_PERCENT:
+        quantity = "counts"
     return Spectrum("", spectrum.nm, spectrum.values, quantity)
 
 
