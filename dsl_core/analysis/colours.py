@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from dsl_core.analysis.band_noise import usual_correlation
 from dsl_core.errors import DecodeError
+from dsl_core.model.result_order import known_bands
 from dsl_core.optics.colour import LEAST_SEEN, delta_e_2000, read_columns, seen_shares, xyz_to_lab
 
 Floats = NDArray[np.float64]
@@ -84,16 +85,16 @@ def xyz_weights(bands_nm: Floats, light: str) -> Floats:
     return np.asarray(matching @ spread / matching[1].sum())
 
 
-def require_bands(bands_nm: Floats, light: str) -> None:
+def require_bands(bands_nm: Floats, light: str, whose: str = "") -> None:
     """Raise `DecodeError` where bands leave out too much of what makes a colour under a light."""
     nm, matching = _table(light)
     seen = seen_shares(bands_nm, nm, matching)
     if np.any(seen < LEAST_SEEN):
         least = int((seen - LEAST_SEEN).argmin())
         raise DecodeError(
-            f"The bands, {bands_nm.min():g} to {bands_nm.max():g} nm, hold {seen[least]:.0%} of"
+            f"The bands{whose}, {bands_nm.min():g} to {bands_nm.max():g} nm, hold {seen[least]:.0%} of"
             f" {'XYZ'[least]} under {light}: too little for a colour. Reconstruct bands from about 430 to 660"
-            " nm, or choose another light."
+            " nm, mask none of them, or choose another light."
         )
 
 
@@ -123,25 +124,21 @@ def colours_of(
 ) -> list[Colour]:
     """The colour of each spectrum (values and deviations, bands each) under each light.
 
-    A band that is missing (NaN) is taken to lie between its neighbours. Deviations that are all NaN are not
-    known: no colour has one then, and differences have that of the other, or none.
+    A band that is missing (NaN) is taken to lie between its neighbours, if these are near. Deviations that
+    are all NaN are not known: no colour has one then, and differences have that of the other, or none.
     ``correlation`` (bands, bands) says how bands err together; the usual one of a result otherwise.
     Differences are to the spectrum named ``reference``. Raises `DecodeError` for unknown lights or names, and
-    for bands that hold too little of a colour.
+    for a spectrum whose known bands hold too little of a colour.
     """
     if reference is not None and reference not in spectra:
         raise DecodeError(f"There is no spectrum {reference!r} to compare with: {', '.join(spectra)}.")
     shared = usual_correlation(bands_nm) if correlation is None else correlation
     found = []
     for light in lights:
-        require_bands(bands_nm, light)
-        weights = xyz_weights(bands_nm, light)
         labs, sure = {}, {name: bool(np.isfinite(std).any()) for name, (_, std) in spectra.items()}
         for name, (values, std) in spectra.items():
-            known = np.isfinite(values)
-            if known.all() or not known.any():
-                labs[name] = _lab_with_covariance(values, std, weights, shared)
-                continue
+            known = known_bands(values)
+            require_bands(bands_nm[known], light, "" if known.all() else f" of {name!r}")
             own = xyz_weights(bands_nm[known], light), shared[np.ix_(known, known)]
             labs[name] = _lab_with_covariance(values[known], std[known], *own)
         for name, (lab, covariance) in labs.items():

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dsl_core.analysis.classification import Classification
-from dsl_core.analysis.colours import Colour, colours_of
+from dsl_core.analysis.colours import USUAL, Colour, colours_of
 from dsl_core.analysis.places import Floats, masks_of_marks, spectra_of_masks
 from dsl_core.errors import DecodeError, StoreError
 from dsl_core.evaluation.report.curves import spectrum_curve
@@ -54,15 +54,23 @@ def session_content(
             for known in (np.isfinite(mean),)
             if known.any()
         ]
-        tables = []
-        try:
-            tables += [colour_table(colours_of(spectra, bands))] if spectra else []
-        except DecodeError as error:
-            missing.append(str(error))
+        colours: list[Colour] = []
+        for name, spectrum in spectra.items():
+            try:
+                colours += colours_of({name: spectrum}, bands)
+            except DecodeError as error:
+                missing.append(str(error))
+        colours.sort(key=lambda each: USUAL.index(each.light))
+        tables = [colour_table(colours)] if colours else []
         centres = (np.argwhere(masks[name]).mean(0).round() for name in spectra)
         places = [(int(y), int(x)) for y, x in centres]
         content = replace(
-            content, curves=curves, tables=tables, places=places, summary=" ".join(missing), has_samples=False
+            content,
+            curves=curves,
+            tables=tables,
+            places=places,
+            summary=" ".join(dict.fromkeys(missing)),
+            has_samples=False,
         )
     if found is not None:
         picture, table = _materials(found)

@@ -34,6 +34,8 @@ _XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], 
 #: Least shares of X, Y and Z of the perfect diffuser that bands must hold for a colour. Missing ends are
 #: continued as they are at the last band, which is right for short ones alone.
 LEAST_SEEN = (0.7, 0.7, 0.55)
+#: A band says nothing of light farther away: a line between two that are farther apart is a guess.
+_REACH_NM = 12.5
 _LUT_STEPS = 4096
 #: Pixels per block, so that intermediates stay in the processor's cache.
 _BLOCK = 32768
@@ -94,10 +96,12 @@ def _observer_weights(shape: tuple[int, ...], content: bytes, illuminant: str) -
 def seen_shares(bands_nm: Floats, nm: Floats, matching: Floats) -> Floats:
     """Shares of X, Y and Z (3,) of the perfect diffuser that bands (bands,), nm, hold.
 
-    ``matching`` (3, wavelengths) is observer times illuminant at ``nm``. Bands reach half a step beyond ends.
+    ``matching`` (3, wavelengths) is observer times illuminant at ``nm``. Bands reach half a step beyond ends,
+    and into gaps between them no farther than 12.5 nm.
     """
     half = abs(bands_nm[-1] - bands_nm[0]) / max(len(bands_nm) - 1, 1) / 2
     inside = (nm >= bands_nm.min() - half) & (nm <= bands_nm.max() + half)
+    inside &= np.abs(nm[:, None] - bands_nm).min(1) <= _REACH_NM
     return np.asarray(matching[:, inside].sum(1) / matching.sum(1))
 
 
@@ -106,6 +110,8 @@ def hold_colour(bands_nm: Floats) -> bool:
 
     >>> hold_colour(np.arange(430.0, 661.0, 5.0)), hold_colour(np.arange(440.0, 461.0, 5.0))
     (True, False)
+    >>> hold_colour(np.array([450.0, 550.0, 650.0]))
+    False
     """
     return bool((seen_shares(np.asarray(bands_nm), CIE_NM, CIE_1931_XYZ * CIE_D65) >= LEAST_SEEN).all())
 

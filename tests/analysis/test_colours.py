@@ -7,7 +7,7 @@ from dsl_core.analysis.colours import ILLUMINANTS, colours_of, lab_of, lights_fo
 from dsl_core.analysis.session_report import colour_table
 from dsl_core.errors import DecodeError
 from dsl_core.optics.charts import chart_reflectance
-from dsl_core.optics.colour import delta_e_2000
+from dsl_core.optics.colour import delta_e_2000, hold_colour
 from tests.cases.colour_science import colour_library
 
 NM = np.arange(430.0, 661.0, 5.0)
@@ -118,3 +118,23 @@ def test_a_missing_band_leaves_a_colour() -> None:
     assert part.delta_e < 0.1
     assert part.lab_std == pytest.approx(whole.lab_std, rel=0.1)
     assert alone.lab == whole.lab
+
+
+@pytest.mark.parametrize("kept_nm", [(450, 550, 650), tuple(nm for nm in NM if nm < 490 or nm > 600)])
+def test_a_line_across_a_wide_gap_makes_no_colour(kept_nm: tuple[float, ...]) -> None:
+    kept, green = np.isin(NM, kept_nm), 0.1 + 0.5 * np.exp(-(((NM - 545) / 25) ** 2))
+    masked, std = np.where(kept, green, np.nan), np.full(NM.size, 0.005)
+    with pytest.raises(DecodeError, match=r"The bands of 'x', 4\d0 to 6\d0 nm, hold .*mask none"):
+        colours_of({"whole": (green, std), "x": (masked, std)}, NM, ("D65",))
+    with pytest.raises(DecodeError, match=r"The bands, 4.* hold"):
+        colours_of({"x": (green[kept], std[kept])}, NM[kept], ("D65",))
+    assert not hold_colour(NM[kept])
+
+
+@pytest.mark.parametrize("step", [2, 4, 6])
+def test_bands_far_apart_hold_a_colour_as_long_as_it_hardly_changes(step: int) -> None:
+    std, chart = np.full(NM.size, 0.005), chart_reflectance(NM)
+    for values in chart.values():
+        whole = colours_of({"x": (values, std)}, NM, ("D65",))[0]
+        coarse = colours_of({"x": (values[::step], std[::step])}, NM[::step], ("D65",))[0]
+        assert float(delta_e_2000(np.array(whole.lab), np.array(coarse.lab))) < 2

@@ -169,6 +169,15 @@ def test_a_missing_band_takes_no_mark_out_of_a_report() -> None:
     assert all("nan" not in curve.line + curve.band for curve in part.curves)
 
 
+def test_a_mark_without_the_green_has_no_colour_in_a_report_and_others_have() -> None:
+    result = chart_result()
+    (x, y), nm = MARKS.pins[0].pixel, result["wavelength_nm"]
+    result["reflectance"][:, y, x] = result["reflectance"][:, y, x].where((nm < 490) | (nm > 600))
+    content = session_content("part", result, MARKS)
+    assert {row[0] for row in content.tables[0].rows} == {"häut 木"}
+    assert "The bands of '$sky_1$ <b>', 430 to 660 nm, hold" in content.summary
+
+
 @pytest.mark.parametrize("ending", [".html", ".pdf"])
 def test_a_result_whose_name_is_not_in_utf_8_has_a_report(tmp_path: Path, ending: str) -> None:
     content = session_content("B\udce4ume", chart_result(), Annotations())

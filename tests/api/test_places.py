@@ -10,7 +10,7 @@ import dsl_core as dsl
 import dsl_core.api.accessor
 from dsl_core.api.places import Place, place_mask
 from dsl_core.errors import DecodeError
-from tests.cases.small_result import small_result
+from tests.cases.small_result import OF_COLOUR_NM, small_result
 
 
 def _box(result: xr.Dataset) -> xr.DataArray:
@@ -20,7 +20,7 @@ def _box(result: xr.Dataset) -> xr.DataArray:
 
 
 def _square() -> xr.Dataset:
-    result = small_result()
+    result = small_result(OF_COLOUR_NM)
     side = min(result.sizes["x"], result.sizes["y"])
     return result.isel(x=slice(0, side), y=slice(0, side))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.model.result import Flag, Reach, build_result
 
@@ -13,20 +14,22 @@ if TYPE_CHECKING:
 
 ROWS, COLUMNS = 6, 9
 WAVELENGTHS_NM = np.array([430.0, 432.5, 550.0, 655.0, 660.0])
+#: Bands that are near enough for a colour, which those above are not.
+OF_COLOUR_NM = np.arange(430.0, 661.0, 23.0)
 #: (row, column) of pixels without any answer, and of one with an answer and a warning.
 UNLIT = (0, 3)
 UNSURE = (5, 8)
 WARNED = (2, 4)
 
 
-def small_result() -> xr.Dataset:
-    """A result of 6 x 9 pixels and 5 bands."""
+def small_result(bands_nm: NDArray[np.float64] = WAVELENGTHS_NM) -> xr.Dataset:
+    """A result of 6 x 9 pixels and 5 bands, unless others are given."""
     rng = np.random.default_rng(7)
     y, x = np.mgrid[0:ROWS, 0:COLUMNS].astype(np.float32)
     depth = (700 + 3 * x - 2 * y).astype(np.float32)
     points = np.stack([(x - 4) * depth / 900, (y - 3) * depth / 900, depth]).astype(np.float32)
     normals = np.broadcast_to(np.array([0.6, 0, -0.8], np.float32)[:, None, None], points.shape).copy()
-    cube = (len(WAVELENGTHS_NM), ROWS, COLUMNS)
+    cube = (len(bands_nm), ROWS, COLUMNS)
     arrays = {
         "depth_mm": depth,
         "depth_std_mm": (0.2 + 0.01 * x).astype(np.float32),
@@ -54,4 +57,4 @@ def small_result() -> xr.Dataset:
         "calibration": "twin μ-rig",  # text outside ASCII must survive wherever a format can hold it
         "white_scale": 12.5,
     }
-    return build_result({**arrays, "reach": reach, "flags": flags}, WAVELENGTHS_NM, attributes)
+    return build_result({**arrays, "reach": reach, "flags": flags}, bands_nm, attributes)

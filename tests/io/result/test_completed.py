@@ -51,9 +51,11 @@ def test_depth_alone_lacks_nothing_of_bands(tmp_path: Path) -> None:
 
 
 def test_bands_that_the_eye_does_not_see_are_said_to_hold_no_colour(tmp_path: Path) -> None:
-    seen = completed(load_arrays(of(tmp_path, build_result({"reflectance": CUBE}, NM, {}))))
+    nm = np.arange(450.0, 651.0, 20.0)
+    cube = np.broadcast_to(CUBE[:1], (nm.size, 4, 5))
+    seen = completed(load_arrays(of(tmp_path, build_result({"reflectance": cube}, nm, {}))))
     assert "colour" not in missing_text(seen)
-    text = missing_text(replace(seen, wavelengths_nm=NM + 250))
+    text = missing_text(replace(seen, wavelengths_nm=nm + 250))
     assert "The bands, 700 to 900 nm, hold too little of a colour" in text
 
 

@@ -21,7 +21,6 @@ from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.analysis.colours import HEADER, ILLUMINANTS, Colour, colours_of, lights_for
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.figure import with_std
-from dsl_core.optics.colour import hold_colour
 
 EMPTY = "Pin pixels, mark regions or add references; their colours under a light are listed here."
 THIN = chr(0x200A)
@@ -66,7 +65,7 @@ class ColoursPanel(QWidget):
         reference = next((label for label, mark in marks.items() if mark is selected), None)
         why = EMPTY
         try:
-            found = self._colours(marks, (str(self.light.currentData()),), reference)
+            found = self._colours(marks, str(self.light.currentData()), reference)
         except DecodeError as error:
             found, why = [], str(error)
         self.copy.setEnabled(bool(found))
@@ -84,9 +83,7 @@ class ColoursPanel(QWidget):
             rows.append((first, *(cell(text, "", RIGHT) for text in texts)))
         self.table.show_rows(rows)
 
-    def _colours(
-        self, marks: dict[str, Mark], lights: tuple[str, ...], reference: str | None
-    ) -> list[Colour]:
+    def _colours(self, marks: dict[str, Mark], light: str, reference: str | None) -> list[Colour]:
         result = self._state.result.value
         if result is None or not result.has_spectra:
             return []
@@ -102,10 +99,10 @@ class ColoursPanel(QWidget):
                 mean, std = at.values, None if mark.curve.std is None else at.std
             known = np.isfinite(mean)
             # Bands that are missing lie between others, if enough are left for a colour.
-            if len(mean) == len(bands) and (known.all() or (known.any() and hold_colour(bands[known]))):
+            if len(mean) == len(bands) and (known.all() or light in lights_for(bands[known])):
                 unknown = np.full(len(bands), np.nan)
                 spectra[name] = np.asarray(mean, float), unknown if std is None else np.asarray(std, float)
-        return colours_of(spectra, bands, lights, reference if reference in spectra else None)
+        return colours_of(spectra, bands, (light,), reference if reference in spectra else None)
 
     def copy_all(self) -> None:
         """Copy the colours under all lights."""
@@ -114,7 +111,7 @@ class ColoursPanel(QWidget):
         reference = next((label for label, mark in marks.items() if mark is selected), None)
         result = self._state.result.value
         lights = () if result is None else lights_for(np.asarray(result.wavelengths_nm, np.float64))
-        found = self._colours(marks, lights, reference)
+        found = [each for light in lights for each in self._colours(marks, light, reference)]
         lines = ["\t".join(HEADER)]
         for each in found:
             cells = (f"{v:.4f}" if isinstance(v, float) else v or "" for v in each.cells)

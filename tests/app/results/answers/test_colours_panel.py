@@ -48,11 +48,12 @@ def test_a_mark_that_lacks_a_band_has_a_colour_and_one_of_a_few_bands_has_none(
     result = load_result(write_small_result(tmp_path)).load()
     result["reflectance"][3] = np.nan
     result["reflectance"][:20, 5, 3] = np.nan
+    result["reflectance"][12:35, 5, 25] = np.nan
     bench = Bench(save_result(result, tmp_path / "lacking.zarr"))
     panel = ColoursPanel(bench.state)
     qtbot.addWidget(panel)
     panel.show()
-    for pixel in ((30, 5), (3, 5)):
+    for pixel in ((30, 5), (3, 5), (25, 5)):
         bench.control.marks.pin(pixel)
     assert [panel.table.item(row, 0).text() for row in range(panel.table.rowCount())] == ["pin 1"]  # type: ignore[union-attr]
 
