@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.export.controller import ExportController
@@ -11,6 +12,7 @@ from dsl_app.results.state import ResultsState
 from dsl_app.shared.undo import UndoStack
 
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 from tests.app.support.small_result import write_small_result
 
@@ -51,3 +53,11 @@ def exports(control: ResultsController) -> ExportController:
 @pytest.fixture
 def bench(tmp_path: Path) -> Bench:
     return Bench(write_small_result(tmp_path))
+
+
+@pytest.fixture
+def lacking(tmp_path: Path) -> Bench:
+    """A controller on a result of which no pixel has the band at 545 nm."""
+    result = load_result(write_small_result(tmp_path / "whole")).load()
+    result["reflectance"].loc[{"wavelength_nm": 545.0}] = np.nan
+    return Bench(save_result(result, tmp_path / "lacking.zarr"))

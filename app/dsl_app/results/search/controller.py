@@ -23,8 +23,8 @@ class SearchController:
 
     def start(self, mode: SearchMode) -> None:
         """Search for the spectrum of the selected mark, or of the cursor if no mark is selected."""
-        result, (name, target) = self.state.result.value, self._target()
-        if result is None or target is None or not result.has_spectra:
+        opened, (name, target) = self.state.result.value, self._target()
+        if opened is None or target is None or not opened.has_spectra:
             self._notifier.tell(
                 "info", "Select a pin, region or reference, or point at a pixel, to search for its spectrum."
             )
@@ -36,7 +36,7 @@ class SearchController:
             if isinstance(target, Spectrum):
                 return target.mean
             try:
-                return result.at_bands(target).values
+                return opened.at_bands(target).values
             except CalibrationError as error:
                 raise CalibrationError(
                     f"{name} cannot be searched for. {error} Choose a reference of this range."
@@ -44,17 +44,21 @@ class SearchController:
 
         def work(progress: Progress) -> Search:
             from dsl_core.evaluation.similarity import angle_noise, likeness
+            from dsl_core.model.result_order import known_bands
 
+            # A band that no pixel has would leave none a spectrum.
+            known = known_bands(opened["reflectance"])
+            result = opened.of_bands(known)
             std = result.known("reflectance_std")
             return Search(
                 name,
-                likeness(result["reflectance"], wanted(), result.wavelengths_nm, progress),
+                likeness(result["reflectance"], wanted()[known], result.wavelengths_nm, progress),
                 mode,
                 noise_rad=None if std is None else angle_noise(result["reflectance"], std),
             )
 
         def done(search: Search) -> None:
-            if self.state.result.value is result and number == self._latest:
+            if self.state.result.value is opened and number == self._latest:
                 self.state.search.set(search)
 
         self._runner.submit(Job(f"Search for {name}", work, done, is_minor=True))

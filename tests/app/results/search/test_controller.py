@@ -14,7 +14,8 @@ from dsl_app.shared.spectrum import Spectrum
 from tests.app.support.doubles import ManualRunner, RecordingNotifier
 from tests.app.support.results_controller import Bench
 from tests.app.support.results_controller import bench as bench
-from tests.app.support.small_result import BLUE, NM
+from tests.app.support.results_controller import lacking as lacking
+from tests.app.support.small_result import BLUE, NM, write_reference
 
 
 def test_looking_for_a_spectrum_finds_its_material(bench: Bench) -> None:
@@ -127,3 +128,17 @@ def test_the_search_that_was_asked_for_last_is_shown(bench: Bench) -> None:
     search.clear()
     runner.run_all()
     assert bench.state.search.value is None
+
+
+def test_a_band_that_no_pixel_has_hides_no_spectrum(lacking: Bench, tmp_path: Path) -> None:
+    lacking.control.point_at((30, 5))
+    lacking.control.search.start(SearchMode.SPECTRUM)
+    search = lacking.state.search.value
+    assert search is not None
+    assert search.found[:, 18:].all()
+    lacking.control.open(write_reference(tmp_path / "tile.csv", BLUE))
+    lacking.control.search.start(SearchMode.SPECTRUM)
+    search = lacking.state.search.value
+    assert search is not None
+    assert search.found[3, 3]
+    assert not search.found[:, 18:].any()
