@@ -297,7 +297,8 @@ class ResultsController:
             from dsl_core.optics.relighting import relight
 
             progress.report("relight", 0, 1)
-            return rgba_of_colours(relight(result["reflectance"], result.wavelengths_nm, light, adapted))
+            known = result.without_missing_bands()
+            return rgba_of_colours(relight(known["reflectance"], known.wavelengths_nm, light, adapted))
 
         def done(picture: NDArray[np.uint8]) -> None:
             if request == self._light_request:

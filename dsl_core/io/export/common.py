@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.model.fit import ATTRIBUTE, Fit
+from dsl_core.model.result_order import without_missing_bands
 from dsl_core.optics.colour import reflectance_to_srgb
 from dsl_core.version import __version__
 
@@ -48,6 +49,7 @@ def colours(result: xr.Dataset) -> NDArray[np.float32] | None:
     if "rgb" in result:
         return plane(result, "rgb")
     if "reflectance" in result:
+        result = without_missing_bands(result)
         return reflectance_to_srgb(plane(result, "reflectance"), np.array(wavelengths_nm(result)))
     return None
 

@@ -17,6 +17,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.export.common import colours, plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, Flag, gravest_flag
+from dsl_core.model.result_order import without_missing_bands
 from dsl_core.optics.levels import Levels, between, three_bands
 from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import Check, never
@@ -73,7 +74,8 @@ def export_png(
             rgb = colours(result)
             assert rgb is not None
         else:
-            rgb = relight(plane(result, "reflectance"), np.array(centres), light, adapted)
+            known = without_missing_bands(result)
+            rgb = relight(plane(known, "reflectance"), np.array(wavelengths_nm(known)), light, adapted)
         return rgb_picture(rgb, colour_levels)
 
     def three() -> Picture:

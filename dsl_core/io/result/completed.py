@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.result import VARIABLES
+from dsl_core.model.result_order import known_bands
 from dsl_core.optics.colour import hold_colour, reflectance_to_srgb
 
 #: What is put in for what a result does not hold: unknown values, no flags, bands that no order is known of.
@@ -39,7 +40,8 @@ def completed(result: ResultArrays) -> ResultArrays:
             arrays[name] = np.broadcast_to(value, tuple(lengths[axis] for axis in VARIABLES[name][0]))
             missing.append(name)
     if result.has_spectra and "rgb" not in arrays:
-        arrays["rgb"] = reflectance_to_srgb(arrays["reflectance"], result.wavelengths_nm)
+        known = result.without_missing_bands()
+        arrays["rgb"] = reflectance_to_srgb(known["reflectance"], known.wavelengths_nm)
     return replace(result, arrays=arrays, missing=tuple(missing))
 
 
@@ -55,9 +57,12 @@ def missing_text(result: ResultArrays) -> str:
         values = result.known(name)
         if values is not None and not any(np.isfinite(part).any() for part in values):
             sentences.append(f"No pixel of this result has a {what}.")
-    if result.has_spectra and not hold_colour(bands := result.wavelengths_nm):
+    if not result.has_spectra:
+        return " ".join(sentences)
+    bands = result.wavelengths_nm[known_bands(result["reflectance"])]
+    if not hold_colour(bands):
         sentences.append(
             f"The bands, {bands.min():g} to {bands.max():g} nm, hold too little of a colour: the colours of"
-            " pictures are as if the spectra continued unchanged."
+            " pictures are as if the spectra went on straight around them."
         )
     return " ".join(sentences)

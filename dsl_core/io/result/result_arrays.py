@@ -16,7 +16,14 @@ from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
 from dsl_core.model.attributes import BAND_WIDTH, FIRST_BAND, stated_band_width_nm, weights_of_wider
 from dsl_core.model.result import VARIABLES
-from dsl_core.model.result_order import BANDS, as_bits, places_px, require_wavelengths, rising_order
+from dsl_core.model.result_order import (
+    BANDS,
+    as_bits,
+    known_bands,
+    places_px,
+    require_wavelengths,
+    rising_order,
+)
 from dsl_core.model.spectral import BandValues, SpectralCurve, at_bands, means_of
 from dsl_core.progress import NoProgress, Progress
 
@@ -86,6 +93,10 @@ class ResultArrays:
             for name, each in self.arrays.items()
         }
         return replace(self, wavelengths_nm=self.wavelengths_nm[chosen], arrays=arrays)
+
+    def without_missing_bands(self) -> ResultArrays:
+        """This result with the bands that a pixel has a reflectance in; the very same where these are all."""
+        return self.of_bands(known_bands(self["reflectance"]))
 
     def averaged_like(self, other: ResultArrays) -> ResultArrays:
         """This result at the bands of another, averaged as far as these are wider; else the very same.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dsl_app.importing.captures.fields import first_mapping
 from dsl_app.results.reconstruct_again.controller import read_source
@@ -17,6 +18,7 @@ from dsl_core.workflows.captures import import_pictures
 from tests.app.importing.captures.small_capture import PROJECTOR, make_capture
 from tests.app.support.results_controller import SQUARE, Bench
 from tests.app.support.results_controller import bench as bench
+from tests.app.support.results_controller import lacking as lacking
 from tests.app.support.small_result import DARK, NM, write_small_result
 
 
@@ -144,3 +146,12 @@ def test_limits_of_depth_are_set_refused_taken_back_and_forgotten(bench: Bench, 
     bench.undo.redo()
     bench.control.open(tmp_path / "small.zarr")
     assert found == [(705.0, 710.0), None, (705.0, 710.0), None, (705.0, 710.0), None]
+
+
+def test_a_band_that_no_pixel_has_leaves_colours_under_another_light(bench: Bench, lacking: Bench) -> None:
+    for each in (bench, lacking):
+        each.control.relight("A", True)
+    shown, wanted = lacking.state.picture.value, bench.state.picture.value
+    assert shown is not None
+    assert wanted is not None
+    assert np.abs(shown.astype(int) - wanted).max() <= 2

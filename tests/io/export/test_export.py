@@ -25,7 +25,16 @@ from dsl_core.optics.colour import srgb_decode
 from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import Check, never
 from tests.cases.plugins import added_by_a_package
-from tests.cases.small_result import COLUMNS, ROWS, UNLIT, UNSURE, WARNED, WAVELENGTHS_NM, small_result
+from tests.cases.small_result import (
+    COLUMNS,
+    OF_COLOUR_NM,
+    ROWS,
+    UNLIT,
+    UNSURE,
+    WARNED,
+    WAVELENGTHS_NM,
+    small_result,
+)
 
 SUFFIX = {
     "csv": ".csv",
@@ -326,6 +335,16 @@ def test_colours_of_spectra_are_exported_where_a_result_holds_none(tmp_path: Pat
         export(each, tmp_path / name, "ply")[0] for each, name in ((result, "a.ply"), (spectral, "b.ply"))
     ]
     assert points[0].stat().st_size == points[1].stat().st_size
+
+
+def test_a_band_that_no_pixel_has_leaves_colours(tmp_path: Path) -> None:
+    result = small_result(OF_COLOUR_NM)
+    lacking = result.drop_vars("rgb").copy(deep=True)
+    lacking["reflectance"][5] = np.nan
+    for light in ("D65", "A"):
+        file = export_png(lacking, tmp_path / "lacking.png", light=light, overwrite=True)[0]
+        grey = (np.array(Image.open(file)) == GREY).all(-1)
+        assert np.array_equal(grey, np.isnan(result["reflectance"].values).any(0)), light
 
 
 def test_pictures_of_nothing_and_of_the_middle_band(tmp_path: Path) -> None:

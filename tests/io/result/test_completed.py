@@ -80,3 +80,17 @@ def test_what_cannot_be_shown_is_said(tmp_path: Path, wrong: str) -> None:
         result = result.drop_vars("wavelength_nm")
     with pytest.raises(StoreError, match="along the axes" if wrong == "axes" else "one wavelength for each"):
         load_arrays(of(tmp_path, result))
+
+
+def test_a_band_that_no_pixel_has_leaves_colours(tmp_path: Path) -> None:
+    nm = np.arange(430.0, 661.0, 10.0)
+    cube = np.broadcast_to(np.linspace(0.1, 0.6, nm.size)[:, None, None], (nm.size, 4, 5)).copy()
+    whole = completed(load_arrays(of(tmp_path, build_result({"reflectance": cube}, nm, {}))))
+    cube[11] = np.nan
+    path = save_result(build_result({"reflectance": cube}, nm, {}), tmp_path / "lacking.zarr")
+    lacking = completed(load_arrays(path))
+    assert lacking["rgb"] == pytest.approx(whole["rgb"], abs=0.01)
+    assert "colour" not in missing_text(lacking)
+    cube[6:18] = np.nan
+    path = save_result(build_result({"reflectance": cube}, nm, {}), tmp_path / "gap.zarr")
+    assert "hold too little of a colour" in missing_text(completed(load_arrays(path)))
