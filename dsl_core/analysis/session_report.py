@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,18 +25,28 @@ from dsl_core.evaluation.report.scan_report import (
 from dsl_core.io.result.annotations_file import Annotations
 from dsl_core.io.staging import write_text
 from dsl_core.model.figure import with_std
+from dsl_core.words import counted
 
 if TYPE_CHECKING:
     import xarray as xr
 
 #: What a report is written as, by the ending of its file.
 ENDINGS = (".html", ".pdf")
+#: A library may have more notes than a page can hold.
+_MOST_NOTES = 20
 
 
 def session_content(
-    title: str, result: xr.Dataset, marks: Annotations, found: Classification | None = None
+    title: str,
+    result: xr.Dataset,
+    marks: Annotations,
+    found: Classification | None = None,
+    notes: Sequence[str] = (),
 ) -> ReportContent:
-    """What the report of a result says: its marks with spectra and colours, and materials if given."""
+    """What the report of a result says: its marks with spectra and colours, and materials if given.
+
+    ``notes`` are those on the classes of the materials.
+    """
     content = report_content(title, result)
     shape = (result.sizes["y"], result.sizes["x"])
     if "reflectance" in result and (marks.pins or marks.regions):
@@ -73,7 +84,7 @@ def session_content(
             has_samples=False,
         )
     if found is not None:
-        picture, table = _materials(found)
+        picture, table = _materials(found, notes)
         content = replace(content, more=[picture], tables=[table, *content.tables])
     return content
 
@@ -97,7 +108,7 @@ def _figure(value: float, std: float | None) -> str:
     return with_std(value, std, 2) if std and math.isfinite(std) else f"{value:.2f}"
 
 
-def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:
+def _materials(found: Classification, notes: Sequence[str]) -> tuple[ReportPicture, ReportTable]:
     shown = found.shown
     colours = shown.palette()
     table = np.zeros((len(colours), 4), np.uint8)
@@ -114,7 +125,8 @@ def _materials(found: Classification) -> tuple[ReportPicture, ReportTable]:
         )
         for row in found.rows
     )
-    note = " ".join((f"By {found.method}; ± one deviation.", *found.notes))
+    more = (f"And {counted(len(notes) - _MOST_NOTES, 'more note')}.",) if len(notes) > _MOST_NOTES else ()
+    note = " ".join((f"By {found.method}; ± one deviation.", *found.notes, *notes[:_MOST_NOTES], *more))
     return picture, ReportTable("Materials", ("Material", "Pixels", "Share", "Area, mm²"), rows, note)
 
 

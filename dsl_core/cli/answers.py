@@ -331,7 +331,7 @@ def report(
     json: Json = False,
 ) -> None:
     """Write pictures, spectra and colours of marks, materials and origin of a result as one document."""
-    from dsl_core.analysis.classification import classify_result
+    from dsl_core.analysis.classification import classify_result, with_known_bands
     from dsl_core.analysis.session_report import ENDINGS, session_content, write_report
     from dsl_core.io.neighbours import beside_result, stem_of
     from dsl_core.io.result.annotations_file import load_annotations
@@ -343,12 +343,13 @@ def report(
     if wrong:
         raise PlanError(f"{wrong[0]} must end in {' or '.join(ENDINGS)}: choose one for --output.")
     check_targets(targets, overwrite=force)
-    result, found = load_result(path), None
+    result, found, notes = load_result(path), None, list[str]()
     with output.progress() as progress:
         if library or materials:
-            classes, _ = _classes(path, result, library, 0.0, "auto", materials, (), progress)
-            found = classify_result(result, classes, progress=progress)
-        content = session_content(stem_of(path), result, load_annotations(path), found)
+            known, missing = with_known_bands(result)
+            classes, notes = _classes(path, known, library, 0.0, "auto", materials, (), progress)
+            found, notes = classify_result(known, classes, progress=progress), [*missing, *notes]
+        content = session_content(stem_of(path), result, load_annotations(path), found, notes)
         for target in targets:
             write_report(content, target, overwrite=force)
     output.say(f"Written: {', '.join(str(target) for target in targets)}")

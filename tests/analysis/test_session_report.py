@@ -16,7 +16,7 @@ from dsl_core.io.result.annotations_file import Annotations, PinRecord, RegionRe
 from dsl_core.io.result.result_file import save_result
 from dsl_core.io.spectra.catalogue import read_spectra
 from dsl_core.model.result import REASONS, Flag
-from tests.cases.chart_cube import chart_result
+from tests.cases.chart_cube import NM, chart_cube, chart_result
 
 MARKS = Annotations(
     pins=(PinRecord(name="$sky_1$ <b>", pixel=(9, 40)), PinRecord(name="dark", pixel=(3, 95))),
@@ -114,6 +114,25 @@ def test_the_commands_tell_colours_and_write_reports(
     ):
         assert main(wrong) == 2
         assert words in capsys.readouterr().err
+
+
+def test_a_report_names_materials_where_a_band_is_missing_and_says_what_was_left_out(tmp_path: Path) -> None:
+    result, chart = chart_result(), chart_cube()
+    result["reflectance"][3] = np.nan
+    path = save_result(result, tmp_path / "lacking.zarr")
+    table = [",".join(("nm", *chart.names[:2], "short"))]
+    for nm, spectrum in zip(NM, chart.spectra[:2].T, strict=True):
+        table.append(
+            ",".join((f"{nm:g}", *(f"{value:.4f}" for value in spectrum), f"{0.3 if nm < 600 else ''}"))
+        )
+    library = tmp_path / "chart.csv"
+    library.write_text("\n".join(table), "utf-8")
+    page = tmp_path / "a.html"
+    assert main(["report", str(path), "--library", str(library), "-o", str(page)]) == 0
+    told = page.read_text("utf-8")
+    assert "of the pixels were not judged" not in told
+    assert "460 nm: left out" in told
+    assert "short (chart.csv) is left out." in told
 
 
 def test_the_command_tells_spectra_of_places_with_what_a_pixel_is_uncertain_by(

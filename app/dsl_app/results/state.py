@@ -171,7 +171,12 @@ class Materials:
 
     name: str
     found: Classification
-    notes: tuple[str, ...] = ()
+    of_classes: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What there is to tell of the map under its limits, then of the classes."""
+        return (*self.found.notes, *self.of_classes)
 
 
 class ResultsState:

@@ -106,7 +106,7 @@ class AnswersController:
             points_mm, normals, std_mm = (result.known(name) for name in names)
             areas = PixelAreas.of(points_mm, normals, std_mm, result.places_px)
             made = Classification.of(scores, way.limits, way.brightness, areas)
-            return Materials(name, made, (*made.notes, *missing, *doubts, *notes))
+            return Materials(name, made, (*missing, *doubts, *notes))
 
         def done(materials: Materials) -> None:
             if self.state.result.value is opened and request == self._request:
@@ -163,6 +163,7 @@ class AnswersController:
                 load_result(result.path),
                 load_annotations(result.path),
                 None if materials is None else materials.found,
+                () if materials is None else materials.of_classes,
             )
             return write_report(content, path, overwrite=overwrite)
 

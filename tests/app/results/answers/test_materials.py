@@ -283,7 +283,7 @@ def test_notes_are_two_lines_that_leave_the_legend_alone(qtbot: QtBot, bench: Be
         (("marks: values up to 80 are percent.",), "1 class by marks. Values up to 80 are percent."),
         (("Two are alike.",), "1 class by marks. Two are alike."),
     ):
-        bench.state.materials.set(replace(_shown(bench), notes=notes))
+        bench.state.materials.set(replace(_shown(bench), of_classes=notes))
         assert panel.text.text() == told
         assert reason in panel.text.toolTip() or reason not in notes
     panel.resize(430, panel.minimumSizeHint().height())
