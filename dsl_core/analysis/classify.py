@@ -259,7 +259,8 @@ def _check(reflectance: Cube, std: Cube | None, classes: Sequence[SpectralClass]
             f"The result has {counted(len(reflectance), 'band')}; to compare shapes of spectra,"
             f" {FEWEST_BANDS} at least are needed. Reconstruct more bands, or classify by rmse."
         )
-    if measure is Measure.PROBABILITY and std is None:
+    states_any = std is not None and any(np.isfinite(band).any() for band in std)
+    if measure is Measure.PROBABILITY and not states_any:
         raise DecodeError(
             "The result states no deviations, so there are no probabilities. Classify by angle or rmse."
         )

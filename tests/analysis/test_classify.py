@@ -195,8 +195,9 @@ def test_wrong_input_is_told(cube: ChartCube) -> None:
         class_of_pixels("x", cube.reflectance, unknown, cube.material == 1)
     with pytest.raises(DecodeError, match=r"has a spectrum\. Mark another place"):
         class_of_pixels("x", np.full_like(cube.reflectance, np.nan), unknown, cube.material == 1)
-    with pytest.raises(DecodeError, match="states no deviations"):
-        score(cube.reflectance, None, None, cube.flags, _classes(cube))
+    for std in (None, unknown):
+        with pytest.raises(DecodeError, match="states no deviations"):
+            score(cube.reflectance, std, None, cube.flags, _classes(cube))
     with pytest.raises(DecodeError, match="does not have the 24 bands"):
         score(cube.reflectance, cube.std, None, cube.flags, [SpectralClass("x", (Member.of(np.ones(3)),))])
 
