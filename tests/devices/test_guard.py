@@ -307,6 +307,17 @@ def test_rows_that_are_empty_again_are_dark_unless_they_had_counts(lab: _Lab, ri
             snap(cut)
 
 
+def test_rows_that_are_always_empty_are_cut_off_where_others_have_a_black_level(
+    lab: _Lab, rig: DeviceRig
+) -> None:
+    rig.camera.configure(10.0)
+    for light_dn in (0, 0, 900, 5):
+        pixels = np.repeat([[64 + light_dn], [64], [0], [0]], 6, 1).astype(np.uint16)
+        lab.act["snap"] = partial(replace, FRAME, pixels=pixels)
+        with pytest.raises(DeviceError, match="2 of 4 rows empty"):
+            rig.camera.snap()
+
+
 def test_a_driver_may_fill_the_same_memory_again(lab: _Lab, rig: DeviceRig) -> None:
     buffer = np.zeros((4, 6), np.uint16)
     lab.act["snap"] = lambda: replace(FRAME, pixels=buffer)
