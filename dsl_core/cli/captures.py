@@ -157,6 +157,11 @@ def _guessed(output: Output, source: Path, rig: Rig | None, options: PictureOpti
         write_record(path, guess.mapping, overwrite=options.force, sealed=False)
     output.say(f"The mapping is saved in {path}; correct it there and use it with --mapping.")
     output.put(mapping=path, others=list(guess.others))
+    if guess.asks:
+        raise StoreError(
+            f"{guess.asks}, and nothing was imported. Correct {path} (unit_px of the stripes; fringes are the"
+            " projector's length through the period), and use it with --mapping instead of --guess."
+        )
     return guess.mapping
 
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.errors import CalibrationError
+from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.pictures.guess import Guess, guess_mapping
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.io.pictures.source import PictureScan, open_pictures
@@ -22,9 +22,12 @@ from dsl_core.workflows.captures import decode_axes, sensor_of
 def guess_poses(folders: list[Path], projector_size_px: tuple[int, int]) -> Guess:
     """How the pictures of the first pose are a capture, which the other poses have to be too.
 
-    Raises `StoreError` when they make no sense.
+    Raises `StoreError` when they make no sense, or leave open what a mapping must state.
     """
-    return guess_mapping(folders[0], projector_size_px)
+    guess = guess_mapping(folders[0], projector_size_px)
+    if guess.asks:
+        raise StoreError(f"{guess.asks}. State it in a mapping, and give that with --mapping.")
+    return guess
 
 
 def read_mapped_pose(folder: Path, mapping: Mapping, bayer: BayerPattern | None = None) -> PoseFrames:

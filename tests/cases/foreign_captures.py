@@ -77,6 +77,13 @@ def frames(
     return out, white, black
 
 
+def counted_sinusoids(folder: Path) -> tuple[Path, str]:
+    """Ten periods of 16 px that 4 bits count, which tell nobody that they are not 16 of 10 px; the size."""
+    sets = (Stripes(bits=4, inverse=False, unit_px=16), Phases(periods_px=(16.0,), steps=4))
+    pictures, white, black = frames([("columns", each) for each in sets], projector=(160, 96))
+    return write(folder, {f"{i:02d}.png": p for i, p in enumerate([white, black, *pictures])}), "160x96"
+
+
 def for_screens(picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """An 8-bit picture through a lens that mixes the light of stripes, stored in sRGB."""
     return np.asarray(np.rint(srgb_encode(blurred(picture) / 255) * 255), np.uint16)

@@ -11,7 +11,7 @@ import pytest
 from dsl_core.cli import main
 from dsl_core.io.result.result_file import load_result
 from dsl_core.model.captured_code import Stripes
-from tests.cases.foreign_captures import CAMERA, PROJECTOR, for_screens, frames, write
+from tests.cases.foreign_captures import CAMERA, PROJECTOR, counted_sinusoids, for_screens, frames, write
 
 
 def test_pictures_become_columns_and_with_a_calibration_depth(
@@ -173,6 +173,18 @@ def test_a_guess_that_decodes_little_is_kept_but_not_imported(
     assert not Path("b.dsl").exists()
     assert main(["import", "set", "--mapping", "set.mapping.json"]) == 0
     assert "Warning: the mapping is likely wrong" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_width_that_nothing_tells_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _, size = counted_sinusoids(tmp_path / "set")
+    assert main(["import", "set", "--guess", "--projector", size, "-o", "a.dsl"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "stripes of 10 px just cover 160 px, those of 16 px do as well" in said
+    assert "nothing was imported. Correct set.mapping.json (unit_px of the stripes" in said
+    assert main(["import", "set", "--mapping", "set.mapping.json", "-o", "a.dsl"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.geometry.projector_corners import observe_pose
-from dsl_core.errors import CalibrationError
+from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.pictures.mapping import (
     BlackPicture,
     Mapping,
@@ -21,7 +21,7 @@ from dsl_core.io.pictures.mapping import (
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.workflows.mapped_poses import guess_poses, read_mapped_pose
 from tests.cases.board_sets import BOARD, PROJECTOR_PX, board_set, phase_set
-from tests.cases.foreign_captures import write
+from tests.cases.foreign_captures import counted_sinusoids, write
 
 ROWS_FIRST = (
     WhitePicture(),
@@ -42,6 +42,12 @@ def folder(tmp_path: Path) -> Path:
 
 def test_the_first_pose_tells_the_order_of_all(folder: Path) -> None:
     assert guess_poses([folder], PROJECTOR_PX).mapping.parts == ROWS_FIRST
+
+
+def test_what_the_first_pose_leaves_open_is_asked_for(tmp_path: Path) -> None:
+    folder, _ = counted_sinusoids(tmp_path / "a")
+    with pytest.raises(StoreError, match=r"must be known\. State it in a mapping"):
+        guess_poses([folder], (160, 96))
 
 
 def test_a_lacking_inverse_is_what_white_leaves(folder: Path) -> None:

@@ -15,7 +15,7 @@ from dsl_core.io.pictures.camera_raw import BITS
 from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of
 from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.float_scale import FloatScale
-from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of
+from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of, untold_width
 from dsl_core.io.pictures.mapping import Encoding, Mapping
 from dsl_core.io.pictures.picture_file import ARRAYS, LINEAR, bayer_of, load_values
 from dsl_core.model.rig import BayerPattern
@@ -43,11 +43,12 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True)
 class Guess:
-    """The mapping, what each file shows by it, what is unsure, and other captures in the same folder."""
+    """The mapping, what each file shows by it, other captures in the folder, and what a person must state."""
 
     mapping: Mapping
     table: tuple[tuple[str, str], ...]
     others: tuple[str, ...]
+    asks: str = ""
 
 
 @dataclass(frozen=True)
@@ -371,7 +372,8 @@ def _guess_of(
     else:
         mapping = mapping.model_copy(update={"encoding": encoding})
     mapping = mapping.model_copy(update={"unsure": tuple(unsure)})
-    return Guess(mapping, arrange(folder, mapping).table, tuple(others))
+    asks = untold_width(found.blocks, size, turned)
+    return Guess(mapping, arrange(folder, mapping).table, tuple(others), asks)
 
 
 def _doubts_of_files(candidate: Candidate, others: Sequence[str], found: Recognised) -> list[str]:

@@ -146,9 +146,11 @@ def _stripes(
             f" {middle}): they are taken to be {as_others}; if not, set offset of the mapping"
         )
     if unit > 1:
+        least = _covering(reading, length)
+        other = f", not {least} px, which just covers them: if not, set unit_px of the mapping"
         doubts.append(
             f"{reading.bits} bits of {axis} are fewer than {length} px need: stripes are taken to be"
-            f" {unit} px wide"
+            f" {unit} px wide{other if least != unit else ''}"
         )
     if not reading.is_sure:
         doubts.append(f"{axis}: another code or order of digits fits nearly as well")
@@ -175,8 +177,35 @@ def _stripes(
 
 
 def _unit(reading: StripeReading, length: int) -> int:
-    """Width of a stripe of one number: all numbers together just cover the projector."""
+    """Width of a stripe of one number: as if the finest digits were left out, where numbers allow that."""
+    finer = max((length - 1).bit_length() - reading.bits, 0)
+    low, high = reading.numbers
+    middle = (2**reading.bits - -(-length >> finer)) // 2
+    from_0 = high << finer <= MOST_BEYOND * length
+    centred = low >= middle and (high - low) << finer <= MOST_BEYOND * length
+    return 1 << finer if from_0 or centred or reading.roughness >= STEADY else _covering(reading, length)
+
+
+def _covering(reading: StripeReading, length: int) -> int:
+    """Width with which all numbers together just cover the projector, the least that is possible."""
     return max(-(-length // (1 << reading.bits)), 1)
+
+
+def untold_width(blocks: Sequence[Block], size_px: Size, turned: bool = False) -> str:
+    """Why nothing tells the period of sinusoids that stripes count, which scales positions; else empty."""
+    for block in blocks:
+        beside = any(b.kind == "phases" and b.axis == block.axis for b in blocks)
+        if not isinstance(block.reading, StripeReading) or not beside:
+            continue
+        length = size_px[(block.axis == "rows") != turned]
+        unit, least = _unit(block.reading, length), _covering(block.reading, length)
+        if unit != least:
+            return (
+                f"{block.reading.bits} bits of {block.axis} count periods of sinusoids, but not how wide they"
+                f" are: stripes of {least} px just cover {length} px, those of {unit} px do as well, and"
+                " others are possible. All positions grow with that width: it must be known"
+            )
+    return ""
 
 
 def _phases(

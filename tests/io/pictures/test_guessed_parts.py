@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.pictures.guessed_parts import _stripes, _unit, guessed_size, part_of
+from dsl_core.io.pictures.guessed_parts import _stripes, _unit, guessed_size, part_of, untold_width
 from dsl_core.io.pictures.mapping import PhasePictures, Skipped, StripePictures, WhitePicture
 from dsl_core.model.captured_code import Axis
 from dsl_core.patterns.recognition.phase_sets import PhaseReading
@@ -81,10 +81,50 @@ def test_sinusoids_say_no_size() -> None:
 
 
 @pytest.mark.parametrize(
-    ("length", "bits", "unit"), [(1024, 10, 1), (1025, 10, 2), (1280, 7, 10), (1920, 7, 15), (600, 10, 1)]
+    ("length", "bits", "numbers", "unit"),
+    [
+        (1024, 10, (3, 1000), 1),
+        (1025, 10, (3, 1000), 2),
+        (1280, 9, (3, 318), 4),  # the finest two of 11 digits are left out
+        (1080, 9, (3, 268), 4),
+        (640, 8, (50, 100), 4),
+        (1280, 9, (100, 410), 4),  # centred on the projector
+        (1280, 9, (3, 420), 3),  # more numbers than stripes of 4 px have
+        (1280, 7, (3, 126), 10),
+        (600, 10, (3, 500), 1),
+    ],
 )
-def test_all_stripes_together_just_cover_the_projector(length: int, bits: int, unit: int) -> None:
-    assert _unit(replace(READING, bits=bits), length) == unit
+def test_stripes_are_as_wide_as_if_the_finest_digits_were_left_out(
+    length: int, bits: int, numbers: tuple[int, int], unit: int
+) -> None:
+    assert _unit(replace(READING, bits=bits, numbers=numbers), length) == unit
+
+
+def test_that_stripes_may_be_of_another_width_is_said() -> None:
+    part, (doubt,) = part_of(stripes("columns", 9, 310), [], (1280, 800), None)  # type: ignore[arg-type]
+    assert isinstance(part, StripePictures)
+    assert part.unit_px == 4
+    assert "taken to be 4 px wide, not 3 px, which just covers them" in doubt
+    assert "not 3" not in part_of(stripes("rows", 9, 190), [], (1280, 1024), None)[1][0]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("most", "size", "turned", "asks"),
+    [
+        (38, (1280, 800), False, "stripes of 20 px just cover 1280 px, those of 32 px do as well"),
+        (38, (800, 1280), True, "stripes of 20 px just cover 1280 px"),
+        (60, (1280, 800), False, ""),
+        (38, (1024, 768), False, ""),
+    ],
+)
+def test_a_period_that_stripes_do_not_tell_is_asked_for(
+    most: int, size: tuple[int, int], turned: bool, asks: str
+) -> None:
+    blocks = [stripes("columns", 6, most), Block("phases", (0, 1, 2, 3), "columns", SINUSOID)]
+    said = untold_width(blocks, size, turned)
+    assert asks in said
+    assert bool(asks) == bool(said)
+    assert untold_width(blocks[:1], size, turned) == ""
 
 
 @pytest.mark.parametrize(

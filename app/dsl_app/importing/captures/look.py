@@ -41,7 +41,7 @@ SMALL_COUNT, SMALL_PX = 24, 56
 
 @dataclass(frozen=True)
 class Guessed:
-    """A guess, or in its place a mapping to begin with and the reason why nothing could be guessed."""
+    """A guess, or in its place a mapping to begin with; ``trouble`` is why, or what a person must state."""
 
     stated: Stated
     sets: tuple[str, ...]
@@ -62,7 +62,8 @@ def guess(request: CaptureRequest, progress: Progress) -> Guessed:
             raise
         mapping = first_mapping(pictures, request.projector_px)
         return Guessed(Stated(mapping), (), sentence_of(error))
-    return Guessed(Stated(found.mapping, is_guessed=True), (found.mapping.name, *found.others))
+    asks = f"{found.asks}. Set Unit of the stripes and Fringes of the sinusoids." if found.asks else ""
+    return Guessed(Stated(found.mapping, is_guessed=True), (found.mapping.name, *found.others), asks)
 
 
 def _count(folder: Path) -> int:

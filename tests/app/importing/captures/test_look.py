@@ -25,7 +25,7 @@ from dsl_core.model.captured_code import Stripes
 from dsl_core.progress import NoProgress
 from dsl_core.workflows.thinned import Thinned
 from tests.app.importing.captures.small_capture import CAMERA, PROJECTOR, request_for
-from tests.cases.foreign_captures import for_screens, frames, scene, write
+from tests.cases.foreign_captures import counted_sinusoids, for_screens, frames, scene, write
 from tests.cases.small_rig import small_rig
 
 MAPPING = first_mapping(12, PROJECTOR)
@@ -52,6 +52,13 @@ def test_pictures_that_make_no_sense_leave_a_mapping_to_correct(tmp_path: Path) 
     assert found.trouble
     assert not found.stated.is_guessed
     assert found.stated.mapping == first_mapping(6, PROJECTOR)
+
+
+def test_a_guess_names_what_a_person_must_state(tmp_path: Path) -> None:
+    folder, _ = counted_sinusoids(tmp_path / "set")
+    found = guess(replace(request_for(folder, tmp_path), projector_px=(160, 96)), NoProgress())
+    assert found.trouble.endswith("it must be known. Set Unit of the stripes and Fringes of the sinusoids.")
+    assert found.stated.is_guessed
 
 
 def test_a_folder_without_pictures_has_nothing_to_correct(tmp_path: Path) -> None:
