@@ -13,7 +13,7 @@ with dsl.open_rig("twin", size="64x48", scene="color-checker") as rig:
         plan = dsl.plan(rig, preset)
         scan = dsl.scan(rig, f"{preset}.dsl", plan)
         result = dsl.reconstruct(scan, bands_nm=(430, 660, 10))
-        result.dsl.save(f"{preset}.zarr")
+        result.dsl.save(f"{preset}.zarr", overwrite=True)
         seconds = plan.duration_s(rig.projector.info.latency_ms)
         found.append((preset, plan.shot_count, seconds, float(result["reflectance_std"].median())))
 

@@ -37,5 +37,8 @@ print(f"{np.nanmean(angle_rad < 0.05):.1%} of the pixels have this shape within 
 # Tables and pictures for other programs.
 
 # %%
-files = dsl.export(result, "cube.hdr") + dsl.export(result, "depth.tif")
+files = [
+    *dsl.export(result, "cube.hdr", overwrite=True),
+    *dsl.export(result, "depth.tif", overwrite=True),
+]
 print(", ".join(path.name for path in files))

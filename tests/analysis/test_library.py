@@ -64,7 +64,7 @@ def test_percent_is_told_and_dark_spectra_of_such_a_file_are_percent_too(tmp_pat
 
 
 def test_what_else_was_made_of_a_file_is_told(tmp_path: Path) -> None:
-    values = np.where(NM == NM[-1], -9999.0, SHARE)
+    values = np.where(NM[-1] == NM, -9999.0, SHARE)
     _csv(tmp_path / "leaf.csv", values, SHARE + 60, titles=("reflectance", "steps"))
     library = read_library([tmp_path])
     assert len(library.entries) == 1

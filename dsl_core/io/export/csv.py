@@ -19,7 +19,7 @@ from dsl_core.io.export.common import provenance, require, require_suffix, wavel
 from dsl_core.io.export.wording import deviation_text, figure_text, header_lines
 from dsl_core.io.staging import staged
 from dsl_core.model.result import Reach, reasons
-from dsl_core.model.result_order import columns_and_rows_px
+from dsl_core.model.result_order import columns_and_rows_px, lie_between_pixels
 from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
@@ -51,11 +51,11 @@ def export_csv(
     pixels: Sequence[Pixel] = (),
     check: Check = never,
 ) -> list[Path]:
-    """Write the spectra of pixels given as (x, y).
+    """Write the spectra of pixels given as (x, y), of each once.
 
     Raises `StoreError` when no pixel is given, one is outside the image, or one is not two numbers.
     """
-    pixels = whole_pixels(pixels)
+    pixels = list(dict.fromkeys(whole_pixels(pixels)))
     require_suffix(path, ".csv")
     require(result, "A table of spectra", "reflectance", "wavelength_nm")
     _check_pixels(result, pixels)
@@ -93,6 +93,12 @@ def _check_pixels(result: xr.Dataset, pixels: Sequence[Pixel]) -> None:
     if not pixels:
         raise StoreError(
             f"A table of spectra needs pixels: give at least one as x,y within {width} x {height}."
+        )
+    if any(axis in result.coords and lie_between_pixels(result[axis].values) for axis in ("x", "y")):
+        raise StoreError(
+            "The pixels of this result are averages over several, whose coordinates are no whole"
+            " numbers, so x,y names none of them. Export the spectrum of a place instead: dsl-scan spectra"
+            " --at, or result.dsl.region(...).dsl.export(...) in Python."
         )
     outside = [f"({x}, {y})" for x, y in pixels if x not in xs or y not in ys]
     if outside:

@@ -8,6 +8,7 @@ import pytest
 
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.export.csv import HEADER, _check_pixels, _reach_in_words, _rows, export_csv
+from dsl_core.io.spectra.formats.own_table import read_own
 from tests.cases.small_result import COLUMNS, ROWS, WAVELENGTHS_NM, small_result
 
 
@@ -49,9 +50,28 @@ def test_pixels_are_counted_from_zero_within_the_image() -> None:
     )
 
 
+def test_a_pixel_that_is_given_twice_is_read_back_once(tmp_path: Path) -> None:
+    result = small_result()
+    path = export_csv(result, tmp_path / "a.csv", pixels=[(2, 1), (1, 1), (2, 1)])[0]
+    found = read_own(path)
+    assert [each.name for each in found] == ["x 2, y 1", "x 1, y 1"]
+    # Earlier versions wrote its rows again.
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines + [line for line in lines if line.startswith("2,1,")]))
+    assert [len(each.nm) for each in read_own(path)] == [len(found[0].nm)] * 2
+
+
+def test_pixels_of_averages_are_not_taken_for_others(tmp_path: Path) -> None:
+    averages = small_result()[["reflectance", "reflectance_std"]].coarsen(x=2, y=2, boundary="trim").mean()
+    with pytest.raises(StoreError, match="averages over several"):
+        export_csv(averages, tmp_path / "a.csv", pixels=[(0, 0)])
+
+
 def test_writing_asks_before_each_pixel_whether_to_go_on(tmp_path: Path) -> None:
     asked = []
-    export_csv(small_result(), tmp_path / "x.csv", pixels=[(0, 0)] * 3, check=lambda: asked.append(1))
+    export_csv(
+        small_result(), tmp_path / "x.csv", pixels=[(0, 0), (1, 0), (2, 0)], check=lambda: asked.append(1)
+    )
     assert len(asked) == 3
 
     def stop() -> None:

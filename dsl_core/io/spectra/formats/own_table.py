@@ -55,14 +55,14 @@ def read_own(path: Path) -> list[Spectrum]:
 def _of_pixels(path: Path, head: list[str], rows: list[list[str]]) -> list[Spectrum]:
     """A spectrum for each pixel of a table, named like ``x 50, y 30``; pixels without one are left out."""
     nm, value = head.index(WAVELENGTH), head.index(REFLECTANCE)
-    found: dict[str, list[tuple[float, float]]] = {}
+    found: dict[str, dict[float, float]] = {}
     for row in rows:
         if len(row) != len(head):
             raise CalibrationError(f"{path.name}: a row is cut off. Export the table again.")
-        found.setdefault(f"x {row[0]}, y {row[1]}", []).append((float(row[nm]), float(row[value])))
+        found.setdefault(f"x {row[0]}, y {row[1]}", {})[float(row[nm])] = float(row[value])
     spectra = []
     for name, pairs in found.items():
-        bands, values = np.array(pairs).T
+        bands, values = np.array(list(pairs.items())).T
         if np.isfinite(values).any():
             spectra.append(Spectrum(name, bands, values, "reflectance", True))
     return spectra
