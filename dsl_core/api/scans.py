@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from dsl_core.api import FilePath, path_of, path_text
@@ -53,10 +54,10 @@ def open_rig(name: FilePath = "twin", **options: object) -> DeviceRig:
 
 
 def _as_text(value: object) -> str:
-    if isinstance(value, bool):
+    if isinstance(value, bool | np.bool_):
         return "on" if value else "off"
-    if isinstance(value, tuple | list):
-        return "x".join(map(str, value))
+    if isinstance(value, tuple | list | np.ndarray):
+        return "x".join(f"{each:g}" if isinstance(each, float) else str(each) for each in value)
     return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
 
 

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError, DecodeError
+from dsl_core.model.base import problems_in_words
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -44,7 +46,10 @@ def decode_stack(
 
     Noise is that of a common sensor of 8 bits or, where values are larger, 16. Raises `DecodeError`.
     """
-    arrays = [np.asarray(each) for each in pictures]
+    # True is white, as in pictures of one bit.
+    arrays = [
+        np.multiply(each, 255) if np.asarray(each).dtype == bool else np.asarray(each) for each in pictures
+    ]
     if not arrays or any(each.ndim != 2 or each.shape != arrays[0].shape for each in arrays):
         shapes = ", ".join(sorted({str(each.shape) for each in arrays})) or "none"
         raise DecodeError(f"Pictures must be grey and of one size (rows, columns), given {shapes}.")
@@ -55,16 +60,7 @@ def decode_stack(
     ]
     if any(each.shape != stack.shape[1:] for each in lights):
         raise DecodeError(f"White and black must have the size of the pictures, {stack.shape[1:]}.")
-    height, width = stack.shape[1:]
-    plan = CapturePlan(
-        name="stack",
-        camera_size_px=(width, height),
-        projector_size_px=projector_size_px,
-        code=code,
-        spectral=NoSpectral(),
-        settings=(Setting(exposure_ms=1.0, level=1.0),),
-        code_settings=(0,),
-    )
+    plan = _plan_of(stack.shape[1:], code, projector_size_px)
     if len(stack) != plan.code_count:
         raise DecodeError(
             f"The code has {plan.code_count} pictures, given {len(stack)}. Give all in its order."
@@ -72,8 +68,28 @@ def decode_stack(
     frames = np.stack([*stack, *lights])
     if frames.min() < 0 or frames.max() > 65535 or (frames != np.rint(frames)).any():
         raise DecodeError("Pictures must hold whole numbers from 0 to 65535, as the camera gave them.")
+    if frames[-2].mean() <= frames[-1].mean():
+        raise DecodeError("White is not brighter than black. Give the pictures of both in this order.")
     sensor = common_sensor(8 if frames.max() < 256 else 16)
     return decode_columns_of(_Stack(plan, frames.astype(np.uint16)), sensor)
+
+
+def _plan_of(shape: tuple[int, ...], code: CodeSet, projector_size_px: tuple[int, int]) -> CapturePlan:
+    """A plan of nothing but a code, for pictures of ``shape`` (rows, columns); raises `DecodeError`."""
+    try:
+        return CapturePlan(
+            name="stack",
+            camera_size_px=(shape[1], shape[0]),
+            projector_size_px=projector_size_px,
+            code=code,
+            spectral=NoSpectral(),
+            settings=(Setting(exposure_ms=1.0, level=1.0),),
+            code_settings=(0,),
+        )
+    except ValidationError as error:
+        raise DecodeError(
+            f"The stack cannot be decoded: {problems_in_words(error, 3, 'code and sizes')}. Correct it."
+        ) from error
 
 
 def calibrate_stacks(

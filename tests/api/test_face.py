@@ -341,6 +341,8 @@ def test_what_is_not_in_a_result_is_told(result: xr.Dataset, scan: ScanReader) -
 def test_options_may_be_sizes_and_wrong_fields_of_plans_are_told() -> None:
     assert {"scan", "read_spectra"} <= set(dir(dsl))
     assert "import_module" not in dir(dsl)
+    with dsl.open_rig("twin", size=np.array([112.0, 72.0]), noise=np.bool_(False)) as rig:
+        assert dsl.plan(rig, "quick").camera_size_px == (112, 72)
     with dsl.open_rig("twin", size=(112, 72)) as rig:
         assert dsl.plan(rig, "quick").camera_size_px == (112, 72)
         with pytest.raises(PlanError, match=r"exposure_ms .* Its fields are schema_version, name"):

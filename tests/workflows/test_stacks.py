@@ -34,6 +34,14 @@ def test_a_stack_tells_the_columns_of_the_scene_with_and_without_lights() -> Non
         assert np.percentile(np.abs(error[known]), 97) < 0.55
 
 
+def test_pictures_of_true_and_false_are_decoded() -> None:
+    pictures, *_ = frames([("columns", Stripes(bits=7))])
+    pairs = zip(pictures[::2], pictures[1::2], strict=True)
+    bits = [each for one, other in pairs for each in (one > other, other > one)]
+    known = np.isfinite(decode_stack(bits, CODE, PROJECTOR)["column_px"].values)
+    assert known.mean() > 0.5
+
+
 def test_depth_of_columns_is_where_rays_meet_them() -> None:
     rig = small_rig()
     z = 600.0
@@ -65,6 +73,10 @@ def test_what_cannot_be_a_stack_is_refused() -> None:
         decode_stack([small, np.zeros((4, 5))], CODE, PROJECTOR)
     with pytest.raises(DecodeError, match="whole numbers from 0 to 65535"):
         decode_stack([small + 0.5] * 14, CODE, PROJECTOR)
+    with pytest.raises(DecodeError, match="code and sizes: images must have 1 to 65535"):
+        decode_stack([small] * 14, CODE, (0, 96), small + 9, small)
+    with pytest.raises(DecodeError, match="White is not brighter than black"):
+        decode_stack([small] * 14, CODE, PROJECTOR, small, small + 9)
     with pytest.raises(DecodeError, match="The columns have shape"):
         depth_of_columns(small_rig(), small)
 
