@@ -103,8 +103,8 @@ class SeriesController:
 
     def set_position(self, path: Path, position_mm: float) -> None:
         """Set the stage position of a result."""
-        row = next(row for row in self.state.rows.value if row.path == path)
-        if row.position_mm == position_mm:
+        row = next((row for row in self.state.rows.value if row.path == path), None)
+        if row is None or row.position_mm == position_mm:
             return
         before = row.position_mm
         self._undo.push(

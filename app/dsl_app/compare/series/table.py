@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem
+from PySide6.QtWidgets import QAbstractItemDelegate, QAbstractItemView, QTableWidgetItem, QWidget
 
 from dsl_app.compare.series.controller import SeriesController
-from dsl_app.compare.series.state import SeriesKind, SeriesState
+from dsl_app.compare.series.state import SeriesKind, SeriesRow, SeriesState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import quiet
@@ -41,6 +41,8 @@ class SeriesTable(ReadTable):
         tip = "Results of the series. Double-click a position to change it."
         super().__init__("Results of the series", tip, STAGE_HEADS)
         self._state, self._control = state, control
+        #: What the lines of the table are of; the state may be ahead while somebody types.
+        self._shown: tuple[SeriesRow, ...] = ()
         triggers = QAbstractItemView.EditTrigger
         self.setEditTriggers(triggers.DoubleClicked | triggers.EditKeyPressed)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -51,7 +53,9 @@ class SeriesTable(ReadTable):
         self.stops = follow_any(self.show_series, state.rows, state.test, state.kind)
 
     def show_series(self) -> None:
-        """Show all rows; the selection stays."""
+        """Show all rows; the selection stays. Who types a position is not disturbed: they are shown after."""
+        if self.state() == QAbstractItemView.State.EditingState:
+            return
         kind = self._state.kind.value
         heads = STAGE_HEADS if kind is SeriesKind.STAGE else SWEEP_HEADS
         with quiet(self):
@@ -62,7 +66,7 @@ class SeriesTable(ReadTable):
                 if item is not None:
                     item.setToolTip(plain_tip(TIPS.get(head, "")))
             self.show_rows([self._items(texts) for texts in row_texts(self._state)])
-            rows = self._state.rows.value
+            rows = self._shown = self._state.rows.value
             at = next((i for i, row in enumerate(rows) if row.path == self._state.selected.value), None)
             self.clearSelection()
             if at is not None:
@@ -77,9 +81,14 @@ class SeriesTable(ReadTable):
     def _typed(self, item: QTableWidgetItem) -> None:
         if item.column() != POSITION or self._state.kind.value is not SeriesKind.STAGE:
             return
-        path, text = self._state.rows.value[item.row()].path, item.text()
+        path, text = self._shown[item.row()].path, item.text()
         # The table cannot be refilled while it is still storing what was typed.
         QTimer.singleShot(0, self, lambda: self._keep(path, text))
+
+    def closeEditor(self, editor: QWidget, hint: QAbstractItemDelegate.EndEditHint) -> None:
+        """Close the editor, then show what changed while it was open."""
+        super().closeEditor(editor, hint)
+        QTimer.singleShot(0, self, self.show_series)
 
     def _keep(self, path: Path, text: str) -> None:
         try:
@@ -94,7 +103,7 @@ class SeriesTable(ReadTable):
     def _chosen(self) -> None:
         rows = self.selectionModel().selectedRows()
         if rows:
-            self._control.select(self._state.rows.value[rows[0].row()].path)
+            self._control.select(self._shown[rows[0].row()].path)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from pytestqt.qtbot import QtBot
 from tests.app.support.compare_page import POSITIONS, Bench
 from tests.app.support.compare_page import bench as bench
 from tests.app.support.compare_page import stage as stage
-from tests.cases.stage_series import write_sweep
+from tests.cases.stage_series import write_stage, write_sweep
 
 
 def filled(qtbot: QtBot, bench: Bench, stage: list[Path]) -> SeriesPanel:
@@ -81,6 +81,39 @@ def test_a_position_is_typed_and_a_row_removed_by_keys(qtbot: QtBot, bench: Benc
     assert first is not None
     first.setText("far")
     qtbot.waitUntil(lambda: panel.table.item(0, 1).text() == "700")  # type: ignore[union-attr]
+
+
+def test_a_position_is_typed_while_other_results_are_read(
+    qtbot: QtBot, bench: Bench, stage: list[Path], tmp_path: Path
+) -> None:
+    panel = filled(qtbot, bench, stage)
+    item = panel.table.item(1, 1)
+    assert item is not None
+    panel.table.setCurrentItem(item)
+    panel.table.editItem(item)
+    (editor,) = panel.table.findChildren(QLineEdit)
+    editor.setText("73")
+    bench.drop(write_stage(tmp_path, 800.0))
+    qtbot.waitUntil(lambda: len(bench.state.counted) == len(stage) + 1, timeout=30_000)
+    assert panel.table.findChildren(QLineEdit) == [editor]
+    QTest.keyClicks(editor, "0,5")
+    QTest.keyClick(editor, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: bench.state.rows.value[1].position_mm == 730.5)
+    qtbot.waitUntil(lambda: panel.table.rowCount() == len(stage) + 1)
+
+
+def test_an_editor_left_by_escape_shows_what_came_meanwhile(
+    qtbot: QtBot, bench: Bench, stage: list[Path], tmp_path: Path
+) -> None:
+    panel = filled(qtbot, bench, stage)
+    item = panel.table.item(1, 1)
+    assert item is not None
+    panel.table.editItem(item)
+    (editor,) = panel.table.findChildren(QLineEdit)
+    bench.page._series_control.remove(stage[0])
+    assert panel.table.rowCount() == len(stage)
+    QTest.keyClick(editor, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: panel.table.rowCount() == len(stage) - 1)
 
 
 @pytest.mark.slow
