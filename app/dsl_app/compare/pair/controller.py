@@ -131,7 +131,14 @@ class PairController:
             self._open_next()
 
         idle = lambda: self.state.busy.set("")  # noqa: E731
-        self._runner.submit(Job(title, work, finished, self._failed, self._waiting.clear, on_ended=idle))
+        self._runner.submit(Job(title, work, finished, self._failed, self._cancelled, on_ended=idle))
+
+    def _cancelled(self) -> None:
+        self._waiting.clear()
+        state = self.state
+        is_compared = state.pair.value is not None or state.trouble.value
+        if state.first.value is not None and state.second.value is not None and not is_compared:
+            state.trouble.set("The comparison was cancelled. Open A or B again.")
 
     def _failed(self, error: Exception) -> None:
         self.state.trouble.set(sentence_of(error))

@@ -170,12 +170,13 @@ def pair_display(state: PairState) -> PairDisplay:
         at_hand=at_hand,
         truth=ButtonState(is_enabled=idle and first is not None, is_primary=takes_truth, why=OPEN_A),
         swap=ButtonState(
-            is_enabled=idle and pair is not None and not has_truth, why=TRUTH_IS_B if has_truth else OPEN_BOTH
+            is_enabled=idle and pair is not None and not has_truth,
+            why=TRUTH_IS_B if has_truth else state.trouble.value or OPEN_BOTH,
         ),
         report=ButtonState(
             is_enabled=idle and pair is not None,
             is_primary=pair is not None,
-            why=OPEN_BOTH,
+            why=state.trouble.value or OPEN_BOTH,
         ),
     )
 

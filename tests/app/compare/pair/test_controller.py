@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.compare.pair.controller import PairController
-from dsl_app.compare.pair.state import PairQuantity, PairState
+from dsl_app.compare.pair.state import PairQuantity, PairState, pair_display
 
 from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.compare_bench import make_result, make_variant
@@ -61,6 +61,25 @@ def test_cancelling_drops_what_waits(results: tuple[Path, Path, Path]) -> None:
     runner.run_all()
     assert compare.state.first.value is None
     assert not compare.state.busy.value
+
+
+def test_a_cancelled_comparison_says_what_to_do(results: tuple[Path, Path, Path]) -> None:
+    runner = ManualRunner()
+    compare = PairController(PairState(), runner, RecordingNotifier())
+    for path in results[:2]:
+        compare.open(path)
+    runner.run_next()
+    runner.run_next()
+    assert runner.waiting[0].title == "Compare chart"
+    runner.waiting[0].cancel()
+    runner.run_all()
+    assert "cancelled" in compare.state.trouble.value
+    display = pair_display(compare.state)
+    assert display.report.why == display.swap.why == display.hint.text == compare.state.trouble.value
+    compare.open_side(results[1], second=True)
+    runner.run_all()
+    assert compare.state.trouble.value == ""
+    assert compare.state.pair.value is not None
 
 
 @pytest.mark.slow
