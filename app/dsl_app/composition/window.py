@@ -16,7 +16,7 @@ from dsl_app.composition.dialogs import ImportAction, ReconstructAgainAction
 from dsl_app.composition.first_connection import FirstConnection
 from dsl_app.composition.rig_profiles import ProfileAction
 from dsl_app.connection.state import Link, RigChoice, RigState
-from dsl_app.shared.evented import Value
+from dsl_app.shared.evented import Value, follow_any
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.paths import is_dir
 from dsl_app.shared.settings import demo_folder
@@ -68,6 +68,8 @@ class Composition(QObject):
         self.scans: ScanController | None = None
         #: Whether the result of a scan is being computed.
         self._awaited = Value(False)
+        #: The result that the Results page shows.
+        self._open_result: Value[Path | None] = Value(None)
 
     def open_window(
         self, folder: Path | None = None, theme: str | None = None, in_background: bool = False
@@ -352,6 +354,12 @@ class Composition(QObject):
         controller.opened.connect(lambda result: self._end_demo(result.path))
         welcome = Welcome(parts.recent, window.open_path, lambda: self.demo.show(), self._awaited)
         self.session.results = controller
+
+        def offer_to_compare() -> None:
+            shown = state.saved_result
+            self._open_result.set(None if shown is None else shown.path)
+
+        follow_any(offer_to_compare, state.result, state.is_begun)
         page = ResultsPage(state, controller, parts.runner, welcome)
         page.open_chosen.connect(window.open_path)
         page.reconstruct_again_requested.connect(lambda: window.do("reconstruct_again"))
@@ -369,12 +377,5 @@ class Composition(QObject):
         controller = PairController(state, parts.runner, toasts)
         series = SeriesController(series_state, parts.runner, toasts, parts.undo)
         self.session.pair, self.session.series = controller, series
-
-        def offer_open_result(_page: str) -> None:
-            results = self.session.results
-            shown = None if results is None else results.state.saved_result
-            state.at_hand.set(None if shown is None else shown.path)
-
-        self.window.opened.connect(offer_open_result)
-        offer_open_result("compare")
+        self._open_result.follow(state.at_hand.set)
         return ComparePage(state, controller, series_state, series, parts.recent)

@@ -81,6 +81,20 @@ def test_who_waits_on_an_empty_results_page_sees_the_result(
     assert results.subject() == path
 
 
+def test_a_result_that_opens_behind_the_compare_page_is_the_one_it_offers(
+    qtbot: QtBot, composed: tuple[Composition, MainWindow], tmp_path: Path
+) -> None:
+    composition, window = composed
+    window.open_page("results")
+    window.open_page("compare")
+    assert composition.session.pair is not None
+    offered = composition.session.pair.state.at_hand
+    assert offered.value is None
+    path = write_small_result(tmp_path)
+    window.page_of("results").open_path(path)
+    qtbot.waitUntil(lambda: offered.value == path, timeout=30_000)
+
+
 def test_a_finished_scan_is_a_recent_file_before_it_has_a_result(
     composed: tuple[Composition, MainWindow], tmp_path: Path
 ) -> None:
