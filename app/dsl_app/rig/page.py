@@ -235,6 +235,7 @@ class RigPage(PageWidget):
         """Choose a rig, which is added to the list if it is new."""
         if self._rig.findData(name) < 0:
             self._rig.addItem(name, name)
+            self._rig.be_narrow()
         self._rig.choose(name)
 
     def _show_profile(self) -> None:
@@ -286,7 +287,8 @@ class RigPage(PageWidget):
 
     def _show_choice(self, choice: RigChoice) -> None:
         """Show what is connected, whichever page requested it."""
-        self._rig.setCurrentIndex(max(self._rig.findData(choice.name), 0))
+        # It may have been given by the path of its profile, or its profile may be gone.
+        self.offer_rig(choice.name)
         self.options.show_options(choice.options)
         self._told = self._choice
         self._show()

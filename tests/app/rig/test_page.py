@@ -326,6 +326,15 @@ def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:
     assert page.options.text.text() == "scan=first.dsl"
 
 
+@pytest.mark.parametrize("name", ["/rigs/of/a/laboratory/with/a/long/name/lab.json", "gone"])
+def test_a_rig_that_is_not_in_the_list_is_shown_and_asked_for_by_its_name(bench: Bench, name: str) -> None:
+    page, state, _, _ = bench
+    state.choice.set(RigChoice(name, (("port", "3"),)))
+    assert page._rig.currentData() == name
+    assert page._choice == state.choice.value
+    assert 0 < page._rig.minimumWidth() < 100, "a long path does not widen the column"
+
+
 def test_a_scan_has_the_projector_for_itself(qtbot: QtBot, bench: Bench) -> None:
     page, state, _, notifier = bench
     connect(qtbot, page, state)
