@@ -25,7 +25,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import DslError, PlanError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry
 from dsl_core.io.plan_file import save_plan
 from dsl_core.io.scan.estimate import estimate
 from dsl_core.io.scan.folder import SUFFIX
@@ -207,23 +207,30 @@ class ScanPlanController:
     def load_library(self) -> None:
         """List the calibrations of the library."""
 
-        def work(progress: Progress) -> tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]:
-            found: list[CalibrationChoice] = []
+        def work(progress: Progress) -> tuple[dict[str, LibraryEntry], list[str]]:
+            found: dict[str, LibraryEntry] = {}
             troubles: list[str] = []
             for name in self._library.names():
                 progress.report("read the library", len(found), 0)
                 try:
-                    found.append(CalibrationChoice(name, name, self._library.find(name).stored))
+                    found[name] = self._library.find(name)
                 except DslError as error:
                     troubles.append(str(error))
-            return tuple(found), tuple(troubles)
+            return found, troubles
 
-        def done(read: tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]) -> None:
-            chosen = self.state.calibration.value
-            # An older version in use is not a name in the library, but stays in the list.
-            older = (chosen,) if "@" in chosen.key else ()
-            self.state.calibrations.set((self.state.calibrations.value[0], *read[0], *older))
-            for trouble in read[1]:
+        def done(read: tuple[dict[str, LibraryEntry], list[str]]) -> None:
+            found, troubles = read
+            listed = {name: CalibrationChoice(name, name, entry.stored) for name, entry in found.items()}
+            used = self.state.calibration.value
+            newer = listed.get(used.key, used)
+            if newer != used and not self.state.phase.value.is_busy:
+                # Another window, or the command line, has stored it again.
+                self._use(newer, found[newer.key].rig)
+            elif used.key:
+                # What scans use stays in the list: an older version, and one that is gone from the library.
+                listed[used.key] = used
+            self.state.calibrations.set((self.state.calibrations.value[0], *listed.values()))
+            for trouble in troubles:
                 self._notifier.tell("warning", trouble)
 
         self._runner.submit(Job("Read the calibrations", work, done, is_minor=True))
@@ -241,18 +248,16 @@ class ScanPlanController:
             self.refresh()
             return
 
-        def done(rig: Rig) -> None:
+        def done(entry: LibraryEntry) -> None:
             if turn != self._turn:
                 return
             if self.state.phase.value.is_busy:
                 self._choose_later(choice)
                 return
-            self._chosen = rig
-            known = self.state.calibrations.value
-            if choice.key not in [each.key for each in known]:
-                self.state.calibrations.set((*known, choice))
-            self.state.calibration.set(choice)
-            self.refresh()
+            used = replace(choice, date=entry.stored)
+            listed = {each.key: each for each in self.state.calibrations.value} | {used.key: used}
+            self.state.calibrations.set(tuple(listed.values()))
+            self._use(used, entry.rig)
 
         def failed(error: Exception) -> None:
             used = self.state.calibration.value.in_use
@@ -260,9 +265,14 @@ class ScanPlanController:
             if turn == self._turn:
                 self.state.refused.emit(choice)
 
-        work = lambda progress: self._library.find(choice.key).rig  # noqa: E731
+        work = lambda progress: self._library.find(choice.key)  # noqa: E731
         title = f"Open the calibration {choice.key}"
         self._runner.submit(Job(title, work, done, failed, is_minor=True))
+
+    def _use(self, choice: CalibrationChoice, rig: Rig) -> None:
+        self._chosen = rig
+        self.state.calibration.set(choice)
+        self.refresh()
 
     def _choose_later(self, choice: CalibrationChoice) -> None:
         is_news = choice != self._next and choice.key != self.state.calibration.value.key

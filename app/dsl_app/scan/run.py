@@ -67,7 +67,7 @@ class CalibrationBox(QGroupBox):
         self._mark(self._state.calibration.value)
 
     def _mark(self, chosen: CalibrationChoice) -> None:
-        self.choice.setCurrentIndex(max(self.choice.findData(chosen.key), 0))
+        self.choice.setCurrentIndex(self.choice.findData(chosen.key))
 
     def _choose(self, index: int) -> None:
         self._controller.plans.choose_calibration(self._state.calibrations.value[index])

@@ -2,11 +2,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from shutil import rmtree
 
 import numpy as np
 import pytest
 from dsl_app.scan.plan_editor import PlanEditor
-from dsl_app.scan.state import Phase, preset_of
+from dsl_app.scan.run import CalibrationBox
+from dsl_app.scan.state import CalibrationChoice, Phase, preset_of
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -236,3 +238,35 @@ def test_buttons_ask_for_files(qtbot: QtBot) -> None:
 def test_a_preset_is_known_on_a_projector_of_more_columns(preset: Preset) -> None:
     wide = on_columns(preset.plan, 1280).model_copy(update={"projector_size_px": (1280, 720)})
     assert preset_of(wide, 1000 / 60) == preset
+
+
+def test_a_calibration_in_use_that_is_stored_again_is_scanned_with(bench: ScanBench) -> None:
+    """By another window or the command line: the list shows its new date."""
+    plans = bench.scans.plans
+    first = bench.library.store("lab", bench.calibration.model_copy(update={"name": "first"}))
+    plans.choose_calibration(CalibrationChoice("lab", "lab"))
+    assert bench.state.calibration.value.date == first.stored
+    second = bench.library.store("lab", bench.calibration.model_copy(update={"name": "second"}))
+    bench.state.phase.set(Phase.RUNNING)
+    plans.load_library()
+    assert plans.calibration == first.rig
+    assert [each.date for each in bench.state.calibrations.value[1:]] == [first.stored]
+    bench.state.phase.set(Phase.DONE)
+    plans.load_library()
+    assert plans.calibration == second.rig
+    assert [each.date for each in bench.state.calibrations.value[1:]] == [second.stored]
+    assert bench.state.calibration.value == bench.state.calibrations.value[1]
+
+
+def test_a_calibration_in_use_that_leaves_the_library_is_still_shown(bench: ScanBench, qtbot: QtBot) -> None:
+    plans = bench.scans.plans
+    bench.library.store("lab", bench.calibration)
+    plans.choose_calibration(CalibrationChoice("lab", "lab"))
+    rmtree(bench.library.home / "lab")
+    plans.load_library()
+    box = CalibrationBox(bench.state, bench.scans)
+    qtbot.addWidget(box)
+    assert box.choice.currentData() == bench.state.calibration.value.key == "lab"
+    assert plans.calibration is not None
+    for stop in box.stops:
+        stop()
