@@ -44,19 +44,23 @@ class AnswersController:
         self.state, self._runner, self._notifier = state, runner, notifier
         self._request = 0
 
-    def from_marks(self, way: Way) -> None:
-        """Look for the spectra of all ticked pins, regions and references."""
+    def from_marks(self, way: Way, cancelled: Callable[[], object] = lambda: None) -> bool:
+        """Look for the spectra of all ticked pins, regions and references; False if there are none.
+
+        ``cancelled`` is called if this is, unless something else was asked for since.
+        """
         marks = [mark for mark in self.state.marks.value if mark.shown and not mark.trouble]
         if not marks:
             self._notifier.tell(
                 "info",
                 "Pin pixels, mark regions of known materials or add references first; they are the classes.",
             )
-            return
-        self._start("marks", way, lambda result, _: (classes_of_marks(result, marks), ()))
+            return False
+        self._start("marks", way, lambda result, _: (classes_of_marks(result, marks), ()), cancelled)
+        return True
 
-    def from_library(self, path: Path, way: Way) -> None:
-        """Look for the spectra of a file, or of a folder with all below it."""
+    def from_library(self, path: Path, way: Way, cancelled: Callable[[], object] = lambda: None) -> None:
+        """Look for the spectra of a file, or of a folder with all below it; ``cancelled`` as of marks."""
 
         def classes(
             result: ResultArrays, progress: Progress
@@ -69,9 +73,9 @@ class AnswersController:
             found, left_out = classes_of_library(library, nm, way.library_error, result.band_width_nm)
             return found, (*library.notes, *left_out)
 
-        self._start(path.name, way, classes)
+        self._start(path.name, way, classes, cancelled)
 
-    def _start(self, name: str, way: Way, classes: _Classes) -> None:
+    def _start(self, name: str, way: Way, classes: _Classes, cancelled: Callable[[], object]) -> None:
         opened = self.state.result.value
         if opened is None or not opened.has_spectra:
             self._notifier.tell("info", "Materials need a result with spectra. Open one first.")
@@ -118,7 +122,11 @@ class AnswersController:
                 self.state.materials.set(None)
             self._notifier.tell("error", f"There is no map by {name}. {sentence_of(error)}")
 
-        self._runner.submit(Job(title, work, done, failed, is_minor=True))
+        def undone() -> None:
+            if request == self._request:
+                cancelled()
+
+        self._runner.submit(Job(title, work, done, failed, undone, is_minor=True))
 
     def set_limits(self, worst: float, margin: float) -> None:
         """Change the limits; the picture and the table follow at once."""

@@ -65,7 +65,9 @@ class MaterialsPanel(QWidget):
     def __init__(self, state: ResultsState, control: AnswersController) -> None:
         super().__init__()
         self._state, self._control, self._theme = state, control, DARK
-        self._library: Path | None = None
+        #: The library, None for marks, and the way of what was asked for last, and of the map that is shown.
+        self._asked: tuple[Path | None, Way] | None = None
+        self._shown: tuple[Path | None, Way] | None = None
         self._shown_scores: Scores | None = None
         self.measure = ChoiceBox(
             "By",
@@ -172,13 +174,32 @@ class MaterialsPanel(QWidget):
 
     def use_marks(self) -> None:
         """Look for the spectra of what is marked."""
-        self._library = None
-        self._control.from_marks(self.way)
+        before, self._asked = self._asked, (None, self.way)
+        if not self._control.from_marks(self.way, self._put_back):
+            self._asked = before
 
     def use_library(self, path: Path) -> None:
         """Look for the spectra of a file or folder."""
-        self._library = path
-        self._control.from_library(path, self.way)
+        self._asked = path, self.way
+        self._control.from_library(path, self.way, self._put_back)
+
+    def _put_back(self) -> None:
+        """Choose again what the map is by that stays, as its successor was cancelled."""
+        self._asked = self._shown
+        if self._shown is None:
+            return
+        way = self._shown[1]
+        with quiet(self.free, self.error):
+            self.free.setChecked(way.brightness == "free")
+            self.error.setValue(100 * way.library_error)
+        self.grouping.choose(way.grouping)
+        self.measure.choose(way.measure)
+        self._new_measure()
+
+    @property
+    def _library(self) -> Path | None:
+        """The library that was asked for last; None for marks."""
+        return None if self._asked is None else self._asked[0]
 
     @property
     def _is_of_chosen_measure(self) -> bool:
@@ -193,16 +214,14 @@ class MaterialsPanel(QWidget):
 
     def _by_library_again(self, wanted: bool = True) -> None:
         """Show the map by other classes of the same library, if it is by one."""
-        materials, library = self._state.materials.value, self._library
-        if not wanted or materials is None or library is None:
-            return
-        if materials.name == library.name:
-            self._control.from_library(library, self.way)
+        library = self._library
+        if wanted and library is not None and self._state.materials.value is not None:
+            self.use_library(library)
 
     def _compare_again(self) -> None:
         """Show the map by the other kind of comparison, from the classes that it has."""
         if self._is_of_chosen_measure and self._library is None:
-            self._control.from_marks(self.way)
+            self.use_marks()
         else:
             self._by_library_again(self._is_of_chosen_measure)
 
@@ -269,7 +288,7 @@ class MaterialsPanel(QWidget):
         if scores is self._shown_scores:
             # A box that is written to while a person types in it loses what is typed.
             return
-        self._shown_scores = scores
+        self._shown_scores, self._shown = scores, self._asked
         self.measure.choose(scores.measure)
         self._offer(scores.measure, limits)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dsl_app.results.answers.controller import Way
+from dsl_app.results.answers.controller import AnswersController, Way
 from dsl_app.results.answers.materials_panel import HINT, ROWS, MaterialsPanel, materials_text
 from dsl_app.results.layers import materials_table, tinted_by
 from dsl_app.results.state import Materials
@@ -21,6 +21,7 @@ from pytestqt.qtbot import QtBot
 
 from dsl_core.analysis import classes
 from dsl_core.analysis.classify import ClassMap, Limits, Measure
+from tests.app.support.doubles import ManualRunner
 from tests.app.support.results_bench import Bench as Window
 from tests.app.support.results_bench import bench as window
 from tests.app.support.results_controller import SQUARE, Bench, opened
@@ -267,6 +268,46 @@ def test_another_brightness_or_library_error_makes_the_map_again(
     before = _shown(bench)
     panel.free.setChecked(True)
     assert _shown(bench) is before, "a map keeps its own measure"
+
+
+def test_marks_that_are_not_there_leave_the_map_of_a_library_as_it_was(
+    qtbot: QtBot, bench: Bench, tmp_path: Path
+) -> None:
+    panel = MaterialsPanel(bench.state, bench.control.answers)
+    qtbot.addWidget(panel)
+    panel.use_library(_library(tmp_path))
+    before = _shown(bench)
+    panel.use_marks()
+    assert "Pin pixels" in bench.told
+    assert _shown(bench) is before
+    panel.error.setValue(30)
+    assert _shown(bench).found.scores is not before.found.scores
+    assert _shown(bench).name == before.name
+
+
+@pytest.mark.parametrize("by_marks", [False, True])
+def test_a_map_that_is_cancelled_leaves_what_the_one_before_is_by(
+    qtbot: QtBot, bench: Bench, tmp_path: Path, by_marks: bool
+) -> None:
+    runner = ManualRunner()
+    panel = MaterialsPanel(bench.state, AnswersController(bench.state, runner, bench.notifier))
+    qtbot.addWidget(panel)
+    bench.control.marks.pin((30, 5))
+    panel.use_library(_library(tmp_path))
+    runner.run_all()
+    before = _shown(bench)
+    if by_marks:
+        panel.use_marks()
+    else:
+        panel.error.setValue(30)
+    runner.waiting[0].cancel()
+    runner.run_all()
+    assert _shown(bench) is before
+    assert panel.error.value() == 0
+    panel.free.setChecked(True)
+    runner.run_all()
+    assert _shown(bench).name == before.name
+    assert _shown(bench) is not before
 
 
 def test_notes_are_two_lines_that_leave_the_legend_alone(qtbot: QtBot, bench: Bench) -> None:
