@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs, region_spectrum
 from dsl_core.io.result.annotations_file import Annotations
+from dsl_core.model.result_order import wavelengths_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,9 +21,10 @@ Floats = NDArray[np.float64]
 
 
 def require_spectra(result: xr.Dataset) -> None:
-    """Raise `DecodeError` for a result without spectra."""
+    """Raise `DecodeError` for a result without spectra, `StoreError` where bands have no wavelengths."""
     if "reflectance" not in result:
         raise DecodeError("The result contains depth only. Reconstruct the scan with spectra.")
+    wavelengths_of(result)
 
 
 def masks_of_marks(marks: Annotations, shape: tuple[int, int]) -> dict[str, Mask]:

@@ -24,7 +24,7 @@ from dsl_core.model.attributes import (
 )
 from dsl_core.model.fit import Fit
 from dsl_core.model.result import DEPTH_INVALID, VARIABLES, Flag
-from dsl_core.model.result_order import BANDS, with_axes, with_bits
+from dsl_core.model.result_order import BANDS, wavelengths_of, with_axes, with_bits
 from dsl_core.model.spectral import SpectralCurve, at_bands, means_of
 from dsl_core.solve.normal import BAND_95
 
@@ -246,6 +246,7 @@ class ResultAccessor:
                 "The result has one band, without the axis of bands. Choose a list of one, such as"
                 f" result.isel({BANDS}=[3]), which keeps the axis."
             )
+        wavelengths_of(self._result)
 
 
 def _with_unstated(result: xr.Dataset) -> xr.Dataset:

@@ -14,7 +14,7 @@ from dsl_core.evaluation.depth import DepthScore, depth_score
 from dsl_core.evaluation.scatter import std_of_mean, std_of_rms
 from dsl_core.evaluation.spectral import Peak, SpectralErrors, known_of_first, peak_width, spectral_errors
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, HonestyCheck, check_honesty
-from dsl_core.model.result_order import BANDS, known_bands, require_wavelengths, without_missing_bands
+from dsl_core.model.result_order import known_bands, wavelengths_of, without_missing_bands
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -153,18 +153,16 @@ def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
     depth, depth_calibration = _depth(result, truth)
     if truth.material is None or truth.spectra is None or "reflectance" not in result:
         return Evaluation(depth, depth_calibration, (), (), None)
-    require_wavelengths(result.coords.get(BANDS, ()), "The result")
+    bands, known = wavelengths_of(result), known_bands(result["reflectance"].values)
     chosen = _chosen(result, truth.material, truth.lit)
     # A band that no pixel has would leave no pixel a spectrum.
-    spectra = truth.spectra[:, known_bands(result["reflectance"].values)]
-    result = without_missing_bands(result)
+    spectra, bands, result = truth.spectra[:, known], bands[known], without_missing_bands(result)
     samples = [
         _Sample.take(result, chosen & (truth.material == index), truth.names[index], spectra[index])
         for index in (range(len(truth.names)) if truth.targets is None else truth.targets)
     ]
     samples = [sample for sample in samples if sample.wanted]
     measured = [sample for sample in samples if sample.measured]
-    bands = result["wavelength_nm"].values.astype(np.float64)
     return Evaluation(
         depth,
         depth_calibration,

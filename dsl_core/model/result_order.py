@@ -73,6 +73,16 @@ def require_wavelengths(nm: ArrayLike, result: object) -> None:
         )
 
 
+def wavelengths_of(result: xr.Dataset, called: object = "The result") -> NDArray[np.float64]:
+    """The centres (bands,) of a result's bands, nm; raises `StoreError` as `require_wavelengths` does.
+
+    An axis without a coordinate has none, though xarray counts along it where it is asked for one.
+    """
+    nm = np.asarray(result[BANDS].values if BANDS in result.coords else (), np.float64)
+    require_wavelengths(nm, called)
+    return nm
+
+
 def rising_order(values: ArrayLike) -> NDArray[np.intp] | None:
     """The order (n,) in which values rise; None where they do already, or are no finite numbers.
 

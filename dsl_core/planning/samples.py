@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
 from dsl_core.model.result import BLACK_ATTRIBUTE, SPECTRUM_INVALID
+from dsl_core.model.result_order import wavelengths_of
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import zero_order
@@ -115,7 +116,7 @@ def scene_samples(rig: Rig, result: xr.Dataset) -> SamplePixels:
     incidence = _incidence(rig, _points(rig, pixels, depth))
     black = _black_of(result.attrs.get(BLACK_ATTRIBUTE))
     found = SamplePixels(pixels, depth, shade, incidence, float(valid.mean()), black_dn_per_ms=black)
-    nm, bands = result["wavelength_nm"].values.astype(np.float64), WavelengthGrid()
+    nm, bands = wavelengths_of(result, "The quick look"), WavelengthGrid()
     if max(nm.min() - bands.start_nm, bands.stop_nm - nm.max()) > SHORT_NM:
         return found
     spectra = result["reflectance"].values.reshape(-1, valid.size)[:, pixels].T.astype(np.float64)

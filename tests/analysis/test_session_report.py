@@ -217,9 +217,10 @@ def test_a_report_on_a_disk_that_fills_up_is_told_and_leaves_nothing(tmp_path: P
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("nm", [500.0, np.nan])
-def test_a_result_whose_bands_have_no_wavelengths_of_their_own_has_no_report(nm: float) -> None:
+@pytest.mark.parametrize("nm", [500.0, np.nan, None])
+def test_a_result_whose_bands_have_no_wavelengths_of_their_own_has_no_report(nm: float | None) -> None:
     result = chart_result()
-    same = result.assign_coords(wavelength_nm=np.full(result.sizes["wavelength_nm"], nm))
+    same = result.assign_coords(wavelength_nm=np.full(result.sizes["wavelength_nm"], nm or 0.0))
+    same = same.drop_vars("wavelength_nm") if nm is None else same
     with pytest.raises(StoreError, match=r"^leaf has a reflectance, but not one wavelength for each"):
         session_content("leaf", same, MARKS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import xarray as xr
 
 import dsl_core as dsl
 from dsl_core.cli import main
+from dsl_core.errors import StoreError
 from tests.cases.small_result import small_result
 
 
@@ -63,3 +65,29 @@ def test_bands_alone_are_a_result_as_well(result: xr.Dataset) -> None:
         less.dsl.good.values.tolist() == result["reflectance"].notnull().all("wavelength_nm").values.tolist()
     )
     assert less.dsl.spectrum(4, 3).attrs["reasons"] == []
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        *(
+            lambda r, f, ending=ending: dsl.export(
+                r.drop_vars("rgb"), f / f"a{ending}", pixels=[(4, 2)] if ending == ".csv" else []
+            )
+            for ending in (".ply", ".png", ".csv", ".hdr", ".exr")
+        ),
+        lambda r, _: r.dsl.region((1, 1, 3, 2)),
+        lambda r, _: dsl.classify(r, pins={"a": (1, 1, 3, 2)}, measure="angle"),
+        lambda r, _: dsl.colours(r, {"a": (1, 1, 3, 2)}, "D65"),
+    ],
+)
+@pytest.mark.parametrize("nm", [None, np.nan])
+def test_bands_that_a_result_does_not_say_the_wavelengths_of_are_not_counted(
+    tmp_path: Path, ask: Callable[[xr.Dataset, Path], object], nm: float | None
+) -> None:
+    result = small_result()
+    last = {"wavelength_nm": np.append(result["wavelength_nm"].values[:-1], nm)}
+    unsaid = result.drop_vars("wavelength_nm") if nm is None else result.assign_coords(last)
+    with pytest.raises(StoreError, match=r"not one wavelength for each of its bands|needs .*wavelength_nm"):
+        ask(unsaid, tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -165,8 +165,9 @@ def test_bands_that_hold_too_little_of_a_colour_have_no_colour_difference(known:
 
 def test_spectra_without_wavelengths_of_their_own_are_not_judged(known: Any) -> None:
     same = known.result.assign_coords(wavelength_nm=np.full(known.result.sizes["wavelength_nm"], 500.0))
-    with pytest.raises(StoreError, match="not one wavelength for each of its bands"):
-        evaluate(same, known.truth)
+    for result in (same, same.drop_vars("wavelength_nm")):
+        with pytest.raises(StoreError, match="not one wavelength for each of its bands"):
+            evaluate(result, known.truth)
 
 
 def test_a_band_that_no_pixel_has_leaves_the_others_judged(known: Any) -> None:

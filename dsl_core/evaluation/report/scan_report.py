@@ -27,12 +27,7 @@ from dsl_core.model.calibration.accepted import MISSED_ATTRIBUTE, read_missed
 from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rendered_effects import RenderedEffects
-from dsl_core.model.result_order import (
-    BANDS,
-    columns_and_rows_px,
-    require_wavelengths,
-    without_missing_bands,
-)
+from dsl_core.model.result_order import columns_and_rows_px, wavelengths_of, without_missing_bands
 from dsl_core.optics.colour import hold_colour
 from dsl_core.words import readable
 
@@ -270,7 +265,7 @@ def report_content(
     Raises `StoreError` where it has a reflectance, but not a wavelength for each band.
     """
     if "reflectance" in result:
-        require_wavelengths(result.coords.get(BANDS, ()), title)
+        wavelengths_of(result, title)
     attributes = dict(result.attrs)
     costs, plan = costs_of(attributes), plan_of(attributes)
     fit = Fit.read(attributes)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.model.fit import ATTRIBUTE, Fit
-from dsl_core.model.result_order import without_missing_bands
+from dsl_core.model.result_order import wavelengths_of, without_missing_bands
 from dsl_core.optics.colour import reflectance_to_srgb
 from dsl_core.version import __version__
 
@@ -55,8 +55,8 @@ def colours(result: xr.Dataset) -> NDArray[np.float32] | None:
 
 
 def wavelengths_nm(result: xr.Dataset) -> list[float]:
-    """Band centres of the result."""
-    return [float(w) for w in result["wavelength_nm"].values]
+    """Band centres of the result; raises `StoreError` where a band has none of its own."""
+    return wavelengths_of(result).tolist()
 
 
 def provenance(result: xr.Dataset) -> dict[str, str]:

@@ -21,6 +21,7 @@ from dsl_core.io.export.common import provenance_of, require_suffix
 from dsl_core.io.export.wording import csv_line, deviation_text, figure_text, header_lines
 from dsl_core.io.spectra.formats.own_table import MEAN, WAVELENGTH
 from dsl_core.io.staging import staged
+from dsl_core.model.result_order import wavelengths_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,7 +56,7 @@ class NamedSpectrum:
 def named_spectrum(spectrum: xr.Dataset) -> NamedSpectrum:
     """What the accessor's ``spectrum`` or ``region`` returned, over ``wavelength_nm`` alone."""
     mean, std = (spectrum[name].values for name in ("reflectance", "reflectance_std"))
-    name, nm = str(spectrum.attrs.get("name", "spectrum")), spectrum["wavelength_nm"].values
+    name, nm = str(spectrum.attrs.get("name", "spectrum")), wavelengths_of(spectrum, "The spectrum")
     if "pixel_std" not in spectrum:
         return NamedSpectrum(name, nm, mean, uncertainty=std)
     return of_region(name, nm, mean, std, spectrum["pixel_std"].values, int(spectrum.attrs["used"]))
