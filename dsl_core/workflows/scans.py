@@ -43,7 +43,7 @@ from dsl_core.model.fit import ATTRIBUTE as FIT_ATTRIBUTE
 from dsl_core.model.fit import Fit
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.result_order import lie_between_pixels, places_px
+from dsl_core.model.result_order import lie_between_pixels, places_px, wavelengths_of
 from dsl_core.model.result_sink import ResultSink, SeenGeometry
 from dsl_core.model.rig import Rig
 from dsl_core.model.scan_proof import ScanProof
@@ -393,9 +393,7 @@ def _no_truth(rig_name: str) -> str:
 
 
 def _bands_of(result: xr.Dataset) -> NDArray[np.float64]:
-    if "wavelength_nm" not in result.coords:
-        return WavelengthGrid().centres_nm
-    return np.asarray(result["wavelength_nm"].values, np.float64)
+    return wavelengths_of(result) if "reflectance" in result else WavelengthGrid().centres_nm
 
 
 def _truth_of_part(truth: Truth, result: xr.Dataset) -> Truth:

@@ -10,7 +10,7 @@ import xarray as xr
 
 import dsl_core as dsl
 from dsl_core import pipeline
-from dsl_core.errors import DecodeError
+from dsl_core.errors import DecodeError, StoreError
 from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.workflows.scans import truth_of, twin_truth
@@ -43,6 +43,13 @@ def test_bands_are_those_of_the_result(whole: xr.Dataset, bands: list[int]) -> N
     assert every.spectra is not None
     np.testing.assert_allclose(here.spectra, every.spectra[:, bands], atol=1e-12)
     assert dsl.evaluate(some).mean("rmse") < 2 * dsl.evaluate(whole).mean("rmse")
+
+
+def test_bands_without_wavelengths_are_told_before_their_truth_is_made(whole: xr.Dataset) -> None:
+    nm = np.append(whole["wavelength_nm"].values[:-1], np.nan)
+    for unsaid in (whole.assign_coords(wavelength_nm=nm), whole.drop_vars("wavelength_nm")):
+        with pytest.raises(StoreError, match="not one wavelength for each of its bands"):
+            dsl.evaluate(unsaid)
 
 
 @pytest.mark.parametrize("step_nm", [5.0, 10.0])
