@@ -23,7 +23,8 @@ from dsl_core.capture.proof.prediction import (
     is_lit_elsewhere,
     is_over_white,
 )
-from dsl_core.capture.proof.raster import Counts
+from dsl_core.capture.proof.raster import Counts, Floats
+from dsl_core.capture.proof.usual_light import FILM_SHARE
 from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import Shot
 
@@ -34,14 +35,13 @@ def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
     if lit is None or wanted is None:
         return Finding(shot, Verdict.UNTOLD)
     share = brightness_of_lines(seen, lit, wanted, known.noise)
-    usual = np.float32(known.learned.usual.share(shot))
-    rivals = [(verdict, known.profile(rival)) for verdict, rival in known.rivals(shot)]
+    # Pixels see a share of their own of each colour, which pictures of other colours do not tell.
+    usual = np.float32(FILM_SHARE if _is_uniform(wanted) else known.learned.usual.share(shot))
+    profiles = [(verdict, known.profile(rival)) for verdict, rival in known.rivals(shot)]
+    rivals = [(verdict, usual * profile) for verdict, profile in profiles if profile is not None]
+    # White is known from its own picture, however bright lines are.
     rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, np.ones_like(wanted))]
-    asked = {
-        verdict: ballots_of_lines(seen, lit, usual * wanted, usual * rival)
-        for verdict, rival in rivals
-        if rival is not None
-    }
+    asked = {verdict: ballots_of_lines(seen, lit, usual * wanted, rival) for verdict, rival in rivals}
     contests = {verdict: counted(each.votes) for verdict, each in asked.items()}
     found = decide(shot, contests, share, known.learned, lambda: _line_shown(known, lit, seen, shot))
     if not found.is_wrong and is_lit_elsewhere(seen, lit, wanted):
@@ -55,6 +55,12 @@ def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
     if colour is None:
         return found
     return replace(found, is_doubtful=True, detail=of_another_pattern(colour), colour=colour)
+
+
+def _is_uniform(profile: Floats) -> bool:
+    """Whether a `line_profile` has one colour in all columns."""
+    leds = profile.reshape(-1, 3)
+    return bool((leds == leds[0]).all())
 
 
 def _colour_of_another(asked: Mapping[Verdict, LineBallots]) -> str | None:
