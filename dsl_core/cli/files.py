@@ -46,7 +46,7 @@ def import_(
     ] = None,
     unit_mm: Annotated[
         float,
-        typer.Option("--unit-mm", min=1e-6, help="Unit of lengths in a stereo file, mm: 1000 for metres."),
+        typer.Option("--unit-mm", min=1e-6, help="Unit of lengths of lenses and pose, mm: 1000 for metres."),
     ] = 1.0,
     from_projector: Annotated[
         bool,
@@ -69,7 +69,7 @@ def import_(
         typer.Option("--mapping", help="MAPPING.json that says what the pictures show; written by --guess."),
     ] = None,
     projector: Annotated[
-        str | None, typer.Option("--projector", help="WIDTHxHEIGHT of the projector, for --guess.")
+        str | None, typer.Option("--projector", help="WIDTHxHEIGHT of the projector's picture.")
     ] = None,
     chosen: Annotated[
         str | None, typer.Option("--set", help="Which of several captures in the folder, for --guess.")
@@ -105,8 +105,8 @@ def import_(
         "--camera-curves": camera_curves,
         "--led-curves": led_curves,
         "--from-projector": from_projector,
-        "--unit-mm": unit_mm != 1.0,
     }
+    of_lengths = {"--unit-mm": unit_mm != 1.0}
     if source.is_file() and source.suffix.lower() in STEREO_FILES:
         _refuse(f"{source} is a stereo file", of_pictures, "a folder of pictures. Name that folder")
         curves = camera_curves, led_curves
@@ -120,6 +120,9 @@ def import_(
     _refuse(
         f"{source} is a folder", of_stereo, "a stereo file. Name the XML, YAML or JSON file with the lenses"
     )
+    is_calibration = holds_calibration(source)
+    if not is_calibration or guess or mapping:
+        _refuse(f"{source} has no lengths", of_lengths, "a stereo file or a published calibration. Name one")
     options = PictureOptions(guess, mapping, projector, chosen, encoding, force)
     if encoding is not None and not options.is_asked_for:
         raise StoreError("--encoding needs --guess or --mapping: add one of them, or leave it out.")
@@ -128,11 +131,14 @@ def import_(
         output.finish()
         return
     rig = load_rig(base) if base else published_rig()
-    if holds_calibration(source):
+    if is_calibration:
         _print_files(output, "calibration", check_calibration(source))
         if target is not None:
-            size = parse_size("--camera-size", camera_size) if camera_size else None
-            imported = exchange.import_calibration(source, rig, size)
+            sizes = {"--camera-size": camera_size, "--projector": projector}
+            camera, light = (parse_size(name, size) if size else None for name, size in sizes.items())
+            imported, doubts = exchange.import_calibration(source, rig, camera, light, unit_mm)
+            for sentence in doubts:
+                output.say(f"Warning: {sentence}.")
             save_rig(imported, target, overwrite=force)
     else:
         _import_dataset(output, source, target, rig)

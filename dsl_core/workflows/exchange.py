@@ -13,6 +13,7 @@ from dsl_core.errors import DslError, StoreError
 from dsl_core.io.published.calibration import check_calibration, holds_calibration, load_calibration
 from dsl_core.io.published.dataset import PUBLISHED_SETTINGS, export_dataset, open_dataset
 from dsl_core.io.published.layout import FileRecord, survey
+from dsl_core.io.published.stereo_words import doubts
 from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
@@ -118,10 +119,18 @@ def import_scan(
     return source.table
 
 
-def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int] | None) -> Rig:
-    """A rig from published lenses, pose and curves on the film, sensor and scales of ``base``.
+def import_calibration(
+    root: Path,
+    base: Rig,
+    camera_size_px: tuple[int, int] | None,
+    projector_size_px: tuple[int, int] | None = None,
+    unit_mm: float = 1.0,
+) -> tuple[Rig, list[str]]:
+    """A rig from published lenses, pose and curves on film, sensor and scales of ``base``, and its doubts.
 
-    Without a size of the camera's images, that of the file is taken.
+    Without a size of the camera's images, that of the file is taken, and without one of the projector's, that
+    of ``base``. Lengths of the file are in units of ``unit_mm``. Raises `CalibrationError`.
     """
-    size = (base.projector.width_px, base.projector.height_px)
-    return load_calibration(root, size, camera_size_px).rig(base)
+    size = projector_size_px or (base.projector.width_px, base.projector.height_px)
+    found = load_calibration(root, size, camera_size_px).in_units_of(unit_mm)
+    return found.rig(base), list(doubts(found.stereo))

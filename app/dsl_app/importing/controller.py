@@ -156,7 +156,7 @@ def import_calibration(request: ImportRequest, library: CalibrationLibrary, prog
     from dsl_core.workflows import exchange
 
     progress.report("read the calibration", 0, 0)
-    rig = exchange.import_calibration(request.folder, base_of(request, library), _size(request))
+    rig, _ = exchange.import_calibration(request.folder, base_of(request, library), _size(request))
     return save_rig(rig, request.target)
 
 

@@ -97,8 +97,8 @@ def _check_pixels(result: xr.Dataset, pixels: Sequence[Pixel]) -> None:
     if any(axis in result.coords and lie_between_pixels(result[axis].values) for axis in ("x", "y")):
         raise StoreError(
             "The pixels of this result are averages over several, whose coordinates are no whole"
-            " numbers, so x,y names none of them. Export the spectrum of a place instead: dsl-scan spectra"
-            " --at, or result.dsl.region(...).dsl.export(...) in Python."
+            " numbers, so x,y names none of them. Export spectra of places instead, such as by"
+            " 'dsl-scan spectra --at'."
         )
     outside = [f"({x}, {y})" for x, y in pixels if x not in xs or y not in ys]
     if outside:

@@ -6,9 +6,12 @@ Lenses and pose are in the file of `dsl_core.io.published.stereo`, curves in tho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pydantic import ValidationError
+
+from dsl_core.errors import CalibrationError
 from dsl_core.io.published.curve_tables import (
     FIRST_ORDER_NAME,
     TABLE_NAMES,
@@ -18,7 +21,9 @@ from dsl_core.io.published.curve_tables import (
 )
 from dsl_core.io.published.layout import FileRecord
 from dsl_core.io.published.stereo import Size, Stereo, load_stereo, save_stereo
+from dsl_core.io.published.stereo_rig import as_large_as
 from dsl_core.io.staging import check_targets
+from dsl_core.model.base import problems_in_words
 from dsl_core.model.rig import Provenance, Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 
@@ -39,7 +44,10 @@ _MEASURED_OF_BASE = {
 
 @dataclass(frozen=True)
 class PublishedCalibration:
-    """Everything the published files hold; the film's shape and the scale of the curves are not in them."""
+    """Everything the published files hold; the film's shape and the scale of the curves are not in them.
+
+    What camera and LEDs were measured in is anybody's choice: curves of each are relative to their largest.
+    """
 
     stereo: Stereo
     response: Rgb
@@ -49,30 +57,44 @@ class PublishedCalibration:
     def rig(self, base: Rig) -> Rig:
         """A rig with these lenses, pose and curves; film, sensor and scales are those of ``base``.
 
-        What ``base`` measured of its own lenses and curves does not hold for these, and is left out.
+        What ``base`` measured of its own lenses and curves does not hold for these, and is left out. Raises
+        `CalibrationError` where no such rig can be.
         """
         fresh = {field: Rig.model_fields[field].default for field in _MEASURED_OF_BASE}
         lost = [what for field, what in _MEASURED_OF_BASE.items() if getattr(base, field) != fresh[field]]
         without = f"; without its {', '.join(lost)}, which hold for its own lenses and curves" if lost else ""
-        return base.model_copy(
+        made = base.model_copy(
             update={
                 **fresh,
                 "name": "published",
                 "camera": self.stereo.camera,
                 "projector": self.stereo.projector,
                 "pose": self.stereo.pose,
-                "response": self.response,
-                "emission": self.emission,
+                "response": as_large_as(base.response, self.response),
+                "emission": as_large_as(base.emission, self.emission),
                 "efficiency": self.efficiency,
                 "correspondence": None,
                 "conditions": None,
                 "calibrations": (),
                 "provenance": Provenance(
                     source="published calibration layout",
-                    notes=f"film, sensor and scales from {base.name!r}{without}",
+                    notes=f"film, sensor and scales, those of the curves too, from {base.name!r}{without}",
                 ),
             }
         )
+        try:
+            return Rig.model_validate(made.model_dump())
+        except ValidationError as error:
+            raise CalibrationError(
+                f"The calibration makes no rig: {problems_in_words(error)}. Correct its files; if its"
+                " lengths are in metres, give --unit-mm 1000 to 'dsl-scan import'."
+            ) from error
+
+    def in_units_of(self, unit_mm: float) -> PublishedCalibration:
+        """The same where the lengths of its file are in units of ``unit_mm``."""
+        pose = self.stereo.pose
+        there = pose.model_copy(update={"translation_mm": tuple((unit_mm * pose.vector_mm).tolist())})
+        return replace(self, stereo=self.stereo.model_copy(update={"pose": there}))
 
 
 def load_calibration(

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
+from dsl_core.io.published.curves import centres_nm
 from dsl_core.io.reading import read_array
 from dsl_core.io.staging import staged
 from dsl_core.model.rig import Rgb, Rig
@@ -34,6 +35,8 @@ TABLE_NAMES = {
 }
 FIRST_ORDER_NAME = "first_order_correspondence_model.npy"
 ORDERS = (-1, 0, 1)
+#: Noise apart, no order has more than all of the light.
+MOST_EFFICIENCY = 1.05
 
 #: Grids the published code uses, by number of bands.
 _GRIDS = {
@@ -106,12 +109,22 @@ def _load(folder: Path, name: str) -> list[SpectralCurve]:
             f"{path} contains negative or non-finite values; a {name} cannot. Measure it again."
         )
     bands = rows.shape[1]
+    if not rows.any(axis=1).all():
+        raise CalibrationError(f"{path}: a {name} is zero throughout. Measure it again.")
+    if name == "efficiency" and rows.max() > MOST_EFFICIENCY:
+        raise CalibrationError(
+            f"{path} holds up to {rows.max():.3g}; an efficiency is a share of the light, not more than 1."
+            " Divide a table in percent by 100, and any other by the light without film."
+        )
     if bands not in _GRIDS:
         known = ", ".join(str(count) for count in sorted(_GRIDS))
         raise CalibrationError(
             f"{path} has {bands} bands; published tables have {known}. Resample it to one of their grids."
         )
-    return [SpectralCurve.of(_GRIDS[bands].centres_nm, row) for row in rows]
+    nm = _GRIDS[bands].centres_nm
+    if name != "efficiency":
+        centres_nm(path, [(nm, row) for row in rows], "in the order of columns")
+    return [SpectralCurve.of(nm, row) for row in rows]
 
 
 def _open(path: Path) -> NDArray[np.generic]:

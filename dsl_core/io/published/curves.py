@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,18 +50,31 @@ def load_curves(path: Path, device: str) -> FoundCurves:
     ordered, order = _ordered(found)
     arrays = [_checked(path, each) for each in ordered]
     most = max(float(each.max()) for each in arrays)
-    centres = [_centre_nm(each.nm, values) for each, values in zip(ordered, arrays, strict=True)]
-    if not centres[0] >= centres[1] >= centres[2]:
-        told = ", ".join(f"{nm:.0f} nm" for nm in centres)
-        raise CalibrationError(
-            f"{path}: red, green and blue ({order}) are centred at {told}; red must have the longest"
-            " wavelength, blue the shortest. Name or order the columns R, G, B."
-        )
+    pairs = [(each.nm, values) for each, values in zip(ordered, arrays, strict=True)]
+    centres = centres_nm(path, pairs, order)
     red, green, blue = (
         SpectralCurve.of(each.nm, values / most) for each, values in zip(ordered, arrays, strict=True)
     )
     told = ", ".join(f"{letter} {nm:.0f} nm" for letter, nm in zip("RGB", centres, strict=True))
     return FoundCurves((red, green, blue), f"curves of the {device}: {path.name}, {order}, centred at {told}")
+
+
+def centres_nm(
+    path: Path, curves: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]], order: str
+) -> list[float]:
+    """Where red, green and blue are centred, of wavelengths and values each, taken in some ``order``.
+
+    Raises `CalibrationError` where they do not follow each other so.
+    """
+    centres = [_centre_nm(nm, values) for nm, values in curves]
+    if not centres[0] >= centres[1] >= centres[2]:
+        told = ", ".join(f"{nm:.0f} nm" for nm in centres)
+        raise CalibrationError(
+            f"{path}: red, green and blue ({order}) are centred at {told}; red must have the longest"
+            " wavelength, blue the shortest. Name or order the columns R, G, B, and wavelengths so that they"
+            " rise."
+        )
+    return centres
 
 
 def _centre_nm(nm: NDArray[np.float64], values: NDArray[np.float64]) -> float:

@@ -42,8 +42,8 @@ def lenses_on(
         projector=stereo.projector,
         pose=stereo.pose,
         film=base.film,
-        response=_as_large(base.response, camera_curves),
-        emission=_as_large(base.emission, led_curves),
+        response=base.response if camera_curves is None else as_large_as(base.response, camera_curves.curves),
+        emission=base.emission if led_curves is None else as_large_as(base.emission, led_curves.curves),
         efficiency=base.efficiency,
         white_scale=base.white_scale,
         depth_range_mm=(NEAREST * distance, FARTHEST * distance),
@@ -54,12 +54,12 @@ def lenses_on(
     )
 
 
-def _as_large(base: Rgb, found: FoundCurves | None) -> Rgb:
-    if found is None:
-        return base
-    most = max(max(curve.values) for curve in base)
+def as_large_as(base: Rgb, curves: Rgb) -> Rgb:
+    """Curves of any scale whose largest value is that of ``base`` at their wavelengths."""
+    of_base = max(one.at(curve.wavelengths_nm).max() for one, curve in zip(base, curves, strict=True))
+    own = max(max(curve.values) for curve in curves)
     red, green, blue = (
-        SpectralCurve.of(curve.wavelengths_nm, np.multiply(curve.values, most), base[0].unit)
-        for curve in found.curves
+        SpectralCurve.of(curve.wavelengths_nm, np.multiply(curve.values, of_base / own), base[0].unit)
+        for curve in curves
     )
     return red, green, blue

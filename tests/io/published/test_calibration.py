@@ -13,9 +13,12 @@ from dsl_core.io.published.calibration import check_calibration, export_calibrat
 from dsl_core.io.published.curve_tables import load_tables, save_tables
 from dsl_core.model.rig import ColumnResidual, FlatField, Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
+from dsl_core.workflows.exchange import import_calibration
 from tests.cases.small_rig import small_rig
 
 BANDS = WavelengthGrid().centres_nm
+#: Red, green and blue, (bands, 3).
+CENTRED = np.exp(-(((BANDS[:, None] - np.array([620.0, 540.0, 460.0])) / 40) ** 2))
 
 
 def test_a_rig_comes_back_from_the_published_files(tmp_path: Path) -> None:
@@ -104,6 +107,14 @@ def _tables(folder: Path, **changes: NDArray[np.generic]) -> None:
         ("DG", np.ones((47, 3)), r"DG\.npy has shape \(47, 3\); \(3, bands\)"),
         ("PEF", np.ones((47, 3, 1)), r"PEF\.npy has shape"),
         ("PEF", np.ones((31, 3)), r"31 bands; published tables have 24, 25, 29, 47\. Resample"),
+        (
+            "CRF",
+            CENTRED[:, ::-1],
+            r"CRF\.npy: red, green and blue \(in the order of columns\) are centred at",
+        ),
+        ("PEF", CENTRED[::-1], r"red must have the longest wavelength"),
+        ("PEF", np.zeros((47, 3)), "is zero throughout"),
+        ("DG", np.full((3, 47), 25.0), "in percent by 100"),
         ("CRF", np.full((47, 3), np.nan), "negative or non-finite"),
         ("DG", np.full((3, 47), -1.0), "negative or non-finite"),
         ("CRF", np.full((47, 3), "x"), "a single array of numbers"),
@@ -113,6 +124,41 @@ def test_wrong_tables_are_refused(tmp_path: Path, name: str, table: NDArray[np.g
     _tables(tmp_path, **{name: table})
     with pytest.raises(CalibrationError, match=says):
         load_tables(tmp_path)
+
+
+def test_curves_of_any_scale_give_the_same_rig(tmp_path: Path) -> None:
+    """Published tables hold what an instrument or a maker counts in, such as 0 to 255."""
+    rig = small_rig()
+    export_calibration(rig, tmp_path)
+    for name, factor in (("CRF", 255.0), ("PEF", 1e-3)):
+        table = tmp_path / "dataset" / "image_formation" / f"{name}.npy"
+        np.save(table, factor * np.load(table))
+    again = load_calibration(tmp_path).rig(rig)
+    for old, new in zip((*rig.response, *rig.emission), (*again.response, *again.emission), strict=True):
+        np.testing.assert_allclose(new.at(BANDS), old.at(BANDS), rtol=1e-9)
+
+
+def test_lengths_in_metres_are_refused_or_read_as_such(tmp_path: Path) -> None:
+    rig = small_rig()
+    there = rig.pose.model_copy(update={"translation_mm": tuple((rig.pose.vector_mm / 1000).tolist())})
+    export_calibration(rig.model_copy(update={"pose": there}), tmp_path)
+    with pytest.raises(CalibrationError, match=r"makes no rig.*more than 1 mm apart.*--unit-mm 1000"):
+        import_calibration(tmp_path, rig, None)
+    found, doubts = import_calibration(tmp_path, rig, None, unit_mm=1000.0)
+    assert found.pose.vector_mm == pytest.approx(rig.pose.vector_mm)
+    assert not doubts
+
+
+def test_lenses_of_another_projector_are_doubted(tmp_path: Path) -> None:
+    rig = small_rig()
+    own = rig.projector
+    export_calibration(
+        rig.model_copy(update={"projector": own.resized(3 * own.width_px, 3 * own.height_px)}), tmp_path
+    )
+    _, doubts = import_calibration(tmp_path, rig, None)
+    assert "projector's principal point" in doubts[0]
+    found, doubts = import_calibration(tmp_path, rig, None, (3 * own.width_px, 3 * own.height_px))
+    assert (found.projector.width_px, doubts) == (3 * own.width_px, [])
 
 
 def test_unreadable_and_missing_tables(tmp_path: Path) -> None:
