@@ -15,7 +15,7 @@ from dsl_app.scan.plan import ScanPlanController
 from dsl_app.scan.reconnect import Reconnector
 from dsl_app.scan.reconstruction import Reconstructor
 from dsl_app.scan.reconstruction_time import Pace
-from dsl_app.scan.state import InterruptedScan, Phase, Reconnection, ScanState
+from dsl_app.scan.state import OWN_CALIBRATION, InterruptedScan, Phase, Reconnection, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import Kind, kind_of
 from dsl_app.shared.notify import Notifier, sentence_of
@@ -344,9 +344,9 @@ class ScanController:
             self._plan_before = self.state.plan.value, self.state.plan_file.value
         self.plans.take_plan(reader.plan)
         self.state.target.set(folder)
-        self.state.interrupted.set(
-            InterruptedScan(folder, total - missing, total, *rig_of_scan(reader.manifest.notes))
-        )
+        own, rig = reader.calibration, rig_of_scan(reader.manifest.notes)
+        name = OWN_CALIBRATION.name if own is None else own.name
+        self.state.interrupted.set(InterruptedScan(folder, total - missing, total, *rig, name))
         self.plans.refresh()
         return True
 

@@ -53,17 +53,21 @@ class CalibrationBox(QGroupBox):
         self.choice.activated.connect(self._choose)
         self.override.toggled.connect(controller.plans.set_override)
         self.stops = [
-            state.calibrations.follow(self._list),
+            *follow_any(self._list, state.calibrations, state.interrupted),
             state.calibration.follow(self._mark),
             state.refused.connect(lambda _: self._mark(state.calibration.value)),
             state.override.follow(self.override.setChecked),
             state.facts.follow(self._show_facts),
         ]
 
-    def _list(self, choices: tuple[CalibrationChoice, ...]) -> None:
+    def _list(self) -> None:
         self.choice.clear()
-        for each in choices:
+        session = self._state.interrupted.value
+        for each in self._state.calibrations.value if session is None else ():
             self.choice.addItem(each.text, each.key)
+        if session is not None:
+            # It is resumed with its own, whatever the next scan uses.
+            self.choice.addItem(session.calibration)
         self._mark(self._state.calibration.value)
 
     def _mark(self, chosen: CalibrationChoice) -> None:

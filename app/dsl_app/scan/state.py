@@ -87,7 +87,8 @@ OWN_CALIBRATION = CalibrationChoice("", "none")
 class InterruptedScan:
     """A scan that lacks frames, and the rig it was captured with (None: unknown).
 
-    A rig of another computer is not opened only because a file names it: then ``may_open`` is False.
+    A rig of another computer is not opened only because a file names it: then ``may_open`` is False. The scan
+    keeps its ``calibration``, which is named here.
     """
 
     folder: Path
@@ -95,6 +96,7 @@ class InterruptedScan:
     total: int
     rig: RigChoice | None = None
     may_open: bool = False
+    calibration: str = OWN_CALIBRATION.name
 
     @property
     def rig_to_open(self) -> RigChoice | None:

@@ -363,6 +363,7 @@ def test_an_interrupted_session_is_offered_and_a_complete_one_is_not(
     assert facts.obstacles == ()
     assert facts.connects
     assert session.rig == TWIN
+    assert session.calibration == bench.calibration.name
     other.rig.state.choice.set(SMALL)
     other.state.then_reconstruct.set(False)
     other.scans.start()

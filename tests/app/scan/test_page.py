@@ -17,7 +17,7 @@ from dsl_app.scan.forecast.panel import READY, ForecastPanel
 from dsl_app.scan.forecast.state import ForecastState
 from dsl_app.scan.frame_box import pattern_levels
 from dsl_app.scan.page import ScanPage
-from dsl_app.scan.state import LivePicture, Phase
+from dsl_app.scan.state import CalibrationChoice, InterruptedScan, LivePicture, Phase
 from dsl_app.scan.view import FramePicture
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.theme import DARK, LIGHT
@@ -273,6 +273,18 @@ def test_a_calibration_that_cannot_be_read_is_not_shown_as_if_in_use(qtbot: QtBo
     assert bench.state.calibration.value.key == ""
     assert page.calibration.choice.currentData() == ""
     assert "no calibration 'torn'" in bench.notifier.told[-1][1]
+
+
+def test_a_scan_that_is_resumed_shows_the_calibration_that_it_keeps(ready: Bench) -> None:
+    page, bench, _ = ready
+    before = page.calibration.choice.currentText()
+    bench.state.calibration.set(CalibrationChoice("Labor", "Labor"))
+    bench.state.interrupted.set(InterruptedScan(Path("half.dsl"), 30, 76, calibration="first rig"))
+    assert page.calibration.choice.currentText() == "first rig"
+    assert not page.calibration.isEnabled()
+    bench.state.calibration.set(bench.state.calibrations.value[0])
+    bench.state.interrupted.set(None)
+    assert page.calibration.choice.currentText() == before
 
 
 def test_no_reconstruction_is_promised_without_calibration(ready: Bench) -> None:
