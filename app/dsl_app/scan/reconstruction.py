@@ -26,6 +26,7 @@ class Reconstructor:
         self._state, self._runner, self._notifier, self._pace = state, runner, notifier, pace
         #: The depth of the reconstruction that runs, from its thread; news until it is in the state.
         self._seen_depth: NDArray[np.float32] | None = None
+        self._running = 0
         self._stop_expecting = state.plan.follow(self._expect)
 
     def take_news(self) -> None:
@@ -42,18 +43,20 @@ class Reconstructor:
         plan, since_s = state.plan.value, time.monotonic()
 
         def done(path: Path) -> None:
-            self._finish()
+            finish(f"The result is saved in {path}.")
             self._pace.learn(plan, time.monotonic() - since_s)
             self._expect(state.plan.value)
-            state.note.set(f"The result is saved in {path}.")
             state.result.emit(path)
 
-        def ended(how: str) -> None:
+        def finish(note: str) -> None:
             self._finish()
             # Another scan may have set a note of its own meanwhile.
             if state.note.value == waiting:
-                retry = "Press Reconstruct… to begin again; the frames are kept."
-                state.note.set(f"{before} The reconstruction {how}. {retry}".strip())
+                state.note.set(note)
+
+        def ended(how: str) -> None:
+            retry = "Press Reconstruct… to begin again; the frames are kept."
+            finish(f"{before} The reconstruction {how}. {retry}".strip())
 
         def failed(error: Exception) -> None:
             ended("failed")
@@ -66,6 +69,7 @@ class Reconstructor:
             return self._reconstruct(session, progress)
 
         state.note.set(waiting)
+        self._running += 1
         state.is_reconstructing.set(True)
         self._runner.submit(Job(f"Reconstruct {session.stem}", work, done, failed, cancelled))
 
@@ -78,6 +82,9 @@ class Reconstructor:
         return reconstruct_to(result_beside(session), session, progress=progress, seen_geometry=see)
 
     def _finish(self) -> None:
+        self._running -= 1
+        if self._running:
+            return
         self._seen_depth = None
         self._state.is_reconstructing.set(False)
         self._state.depth.set(None)
