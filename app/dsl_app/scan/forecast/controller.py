@@ -255,6 +255,8 @@ class ForecastController:
     def _measure(self, result: Path) -> None:
         """Compare a new result with the truth, if known; its scene can then be planned for."""
         self.state.last_look.set(result)
+        if self.state.look.value is not None:
+            self.look(result)
         scan = self.state.measured.value
         if scan is None or scan.name != result.stem:
             return

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 from dsl_app.connection.state import RigChoice
@@ -283,6 +284,24 @@ def test_the_scene_of_a_result_can_be_planned_for(
     assert len(counted) == 2 * done
     control.look(look)
     assert (len(seen), len(counted)) == (1, 2 * done)
+
+
+def test_predictions_for_the_last_scan_follow_each_further_scan(
+    bench: ScanBench, tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(samples, "scene_samples", lambda *_: "the scene")
+    control, saved = forecast(bench, tmp_path), write_small_result(tmp_path)
+    first, second, third = (copytree(saved, tmp_path / f"{name}.zarr") for name in ("a", "b", "c"))
+    bench.state.result.emit(first)
+    assert control.state.look.value is None
+    control.look(first)
+    done = len(counted)
+    bench.state.result.emit(second)
+    assert control.state.look.value == second
+    assert len(counted) > done
+    control.look(None)
+    bench.state.result.emit(third)
+    assert control.state.look.value is None
 
 
 def test_a_look_of_another_size_says_so(bench: ScanBench, tmp_path: Path, counted: list[str]) -> None:
