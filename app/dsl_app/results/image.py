@@ -146,7 +146,9 @@ class ResultImage(QWidget):
         before = None if self._layers is None else self._layers.result.picture
         self._layers = None if result is None else Layers(result)
         self.paint()
-        if result is not None and result.picture != before:
+        if result is None or result.picture != before:
+            # The corners drawn so far are of another picture.
+            self.box.cancel_outline()
             self.fit()
 
     def fit(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from pytestqt.qtbot import QtBot
 
 from tests.app.support.results_bench import Bench
 from tests.app.support.results_bench import bench as bench
-from tests.app.support.small_result import DARK
+from tests.app.support.small_result import DARK, write_small_result
 
 
 def test_a_click_pins_and_keys_move_pin_and_remove(bench: Bench, qtbot: QtBot) -> None:
@@ -54,6 +55,18 @@ def test_regions_are_drawn_with_every_tool(bench: Bench, qtbot: QtBot) -> None:
         QTest.qWait(1)
     QTest.keyClick(bench.page.image.content.canvas, Qt.Key.Key_Return)
     assert bench.marks[2].used == pytest.approx(40, abs=12)
+
+
+def test_an_outline_that_is_begun_does_not_go_on_in_another_result(bench: Bench, tmp_path: Path) -> None:
+    bench.page.bar.tools[Tool.POLYGON].click()
+    for corner in ((2, 12), (12, 12), (12, 20)):
+        QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at(corner))
+        QTest.qWait(1)
+    assert bench.page.image.content.box.is_drawing
+    (tmp_path / "other").mkdir()
+    bench.window.open_path(write_small_result(tmp_path / "other"))
+    QTest.keyClick(bench.page.image.content.canvas, Qt.Key.Key_Return)
+    assert not any(mark.kind == "region" for mark in bench.marks)
 
 
 def test_an_ellipse_holds_pi_quarters_of_its_box(bench: Bench) -> None:
