@@ -13,6 +13,10 @@ Floats = NDArray[np.float64]
 Given = NDArray[np.float32] | NDArray[np.float64]
 
 
+#: Spectra drawn for deviations without continuum; they state those within about 10 %.
+_DRAWS = 100
+
+
 class Transform(Enum):
     """What is drawn instead of reflectance; the value names it."""
 
@@ -27,9 +31,10 @@ def transformed(
 ) -> tuple[Floats, Floats | None]:
     """A spectrum (bands,) and its deviations after a transform.
 
-    Deviations are propagated to first order, with the correlation that bands at ``nm`` usually have; the
-    level, for instance, leaves a normalised spectrum. Without deviations there are none. A spectrum that is
-    not finite, or has no level, stays as it is or becomes NaN.
+    Deviations are propagated with the correlation that bands at ``nm`` usually have; the level, for instance,
+    leaves a normalised spectrum. To first order, but for the continuum: noise lifts it to its own peaks, so
+    that deviations contain by how much. Without deviations there are none. A spectrum that is not finite, or
+    has no level, stays as it is or becomes NaN.
     """
     values = np.asarray(mean, np.float64)
     spread = None if std is None else np.asarray(std, np.float64)
@@ -37,7 +42,11 @@ def transformed(
         return values, spread
     if len(values) < 3 or not np.isfinite(values).all():
         return np.full(len(values), np.nan), None if spread is None else np.full(len(values), np.nan)
-    found, slope = _FUNCTIONS[transform](np.asarray(nm, np.float64), values)
+    bands_nm = np.asarray(nm, np.float64)
+    if transform is Transform.CONTINUUM:
+        found = _continuum_removed(bands_nm, values)
+        return found, None if spread is None else _drawn(bands_nm, values, np.nan_to_num(spread), found)
+    found, slope = _FUNCTIONS[transform](bands_nm, values)
     if spread is None:
         return found, None
     factor = slope * np.nan_to_num(spread)
@@ -59,34 +68,37 @@ def _derivative(nm: Floats, values: Floats) -> tuple[Floats, Floats]:
     return slope @ values, slope
 
 
-def _continuum_removed(nm: Floats, values: Floats) -> tuple[Floats, Floats]:
+def _drawn(nm: Floats, values: Floats, std: Floats, found: Floats) -> Floats:
+    """How far ``found``, without its continuum, is from what it is without noise: root mean square (bands,).
+
+    As much noise again makes the sum larger by the root of 2, and so how far peaks of noise lift the hull.
+    """
+    root = np.linalg.cholesky(usual_correlation(nm))
+    draws = values + std * (np.random.default_rng(0).standard_normal((_DRAWS, len(nm))) @ root.T)
+    moves = np.stack([_continuum_removed(nm, draw) - found for draw in draws])
+    return np.asarray(np.hypot(moves.std(0), moves.mean(0) / (np.sqrt(2) - 1)))
+
+
+def _continuum_removed(nm: Floats, values: Floats) -> Floats:
     """Divided by the upper convex hull (R. N. Clark, T. L. Roush, J. Geophys. Res. 89, 1984)."""
-    weights = hull_weights(nm, values)
-    hull = weights @ values
-    if (hull <= 1e-9).any():
-        return np.full(len(nm), np.nan), np.full((len(nm), len(nm)), np.nan)
-    found = values / hull
-    return found, (np.eye(len(nm)) - found[:, None] * weights) / hull[:, None]
+    hull = upper_hull(nm, values)
+    return values / hull if (hull > 1e-9).all() else np.full(len(nm), np.nan)
 
 
-def hull_weights(nm: Floats, values: Floats) -> Floats:
-    """Weights (bands, bands) that turn a spectrum into its upper convex hull at its own bands."""
-    corners: list[int] = []
-    for band in range(len(nm)):
+def upper_hull(nm: Floats, values: Floats) -> Floats:
+    """The upper convex hull of a spectrum at its own bands (bands,)."""
+    corners: list[tuple[float, float]] = []
+    for x, y in zip(nm.tolist(), values.tolist(), strict=True):
         while len(corners) > 1:
-            first, last = corners[-2], corners[-1]
-            turn = (nm[last] - nm[first]) * (values[band] - values[first])
-            turn -= (values[last] - values[first]) * (nm[band] - nm[first])
-            if turn < 0:
+            (first_x, first_y), (last_x, last_y) = corners[-2:]
+            if (last_x - first_x) * (y - first_y) < (last_y - first_y) * (x - first_x):
                 break
             corners.pop()
-        corners.append(band)
-    unit = np.eye(len(nm))[corners]
-    return np.stack([np.interp(nm, nm[corners], column) for column in unit.T], axis=1)
+        corners.append((x, y))
+    return np.interp(nm, *np.transpose(corners))
 
 
 _FUNCTIONS = {
     Transform.NORMALISED: _normalised,
     Transform.DERIVATIVE: _derivative,
-    Transform.CONTINUUM: _continuum_removed,
 }
