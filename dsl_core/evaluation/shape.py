@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.grid_mesh import are_joined
 from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float32] | NDArray[np.float64]
@@ -187,11 +188,12 @@ def _on_line(
     right = np.minimum(left + (x - left > 1e-6), points.shape[2] - 1)
     below = np.minimum(top + (y - top > 1e-6), points.shape[1] - 1)
     one, other = (np.asarray(points[:, *at], np.float64) for at in ((top, left), (below, right)))
-    # Where only one of the two has a point, nothing is made up; the nearer one decides.
-    mixed = one + share * (other - one)
-    found = np.where(np.isfinite(mixed), mixed, np.where(share < 0.5, one, other))
-    if std is None:
-        return found, np.full(len(x), np.nan)
-    a, b = (np.asarray(std[at], np.float64) for at in ((top, left), (below, right)))
+    a, b = (
+        np.full(len(x), np.nan) if std is None else np.asarray(std[at], np.float64)
+        for at in ((top, left), (below, right))
+    )
+    # Where the surface does not go on from one to the other, nothing is made up; the nearer one decides.
+    mixes = are_joined(one, other, np.hypot(np.nan_to_num(a), np.nan_to_num(b)))
+    found = np.where(mixes, one + share * (other - one), np.where(share < 0.5, one, other))
     spread = np.hypot((1 - share) * a, share * b)
-    return found, np.where(np.isfinite(spread), spread, np.where(share < 0.5, a, b))
+    return found, np.where(mixes & np.isfinite(spread), spread, np.where(share < 0.5, a, b))

@@ -100,20 +100,27 @@ class _Links:
 
     def joined(self, one: tuple[int, int], other: tuple[int, int]) -> Mask:
         """Whether a surface continues from one corner of each square to another one."""
-        p, q = self._at(self._points, one), self._at(self._points, other)
-        between, middle = q - p, (p + q) / 2
-        distance = np.sqrt((middle**2).sum(0))
-        along = np.abs((between * middle).sum(0) / distance)
-        across = np.sqrt(np.maximum((between**2).sum(0) - along**2, 0))
-        noise = np.zeros_like(along)
-        if self._std is not None:
-            noise = STEP_SIGMAS * np.hypot(self._at(self._std, one), self._at(self._std, other))
-        is_cut = (along > STEEPEST * across) & (along > np.minimum(noise, STEP_SHARE * distance))
-        if self._edge is not None:
-            both = self._at(self._edge, one) & self._at(self._edge, other)
-            is_cut |= both & (along > np.maximum(noise, JUMP_SHARE * distance))
-        known = np.isfinite(along)
-        return np.asarray(known & ~is_cut)
+        std = None if self._std is None else np.hypot(self._at(self._std, one), self._at(self._std, other))
+        edge = None if self._edge is None else self._at(self._edge, one) & self._at(self._edge, other)
+        return are_joined(self._at(self._points, one), self._at(self._points, other), std, edge)
+
+
+def are_joined(
+    one_mm: Floats, other_mm: Floats, step_std_mm: Floats | None = None, edge: Mask | None = None
+) -> Mask:
+    """Whether a surface continues between neighbours (3, ...) in camera coordinates; not to where none is.
+
+    ``step_std_mm`` (...) is the deviation of the step in depth between them, ``edge`` marks jumps of depth.
+    """
+    between, middle = other_mm - one_mm, (one_mm + other_mm) / 2
+    distance = np.sqrt((middle**2).sum(0))
+    along = np.abs((between * middle).sum(0) / distance)
+    across = np.sqrt(np.maximum((between**2).sum(0) - along**2, 0))
+    noise = np.zeros_like(along) if step_std_mm is None else STEP_SIGMAS * step_std_mm
+    is_cut = (along > STEEPEST * across) & (along > np.minimum(noise, STEP_SHARE * distance))
+    if edge is not None:
+        is_cut |= edge & (along > np.maximum(noise, JUMP_SHARE * distance))
+    return np.asarray(np.isfinite(along) & ~is_cut)
 
 
 def normals_of(points_mm: Floats, triangles: NDArray[np.int32]) -> NDArray[np.float32]:

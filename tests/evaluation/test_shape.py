@@ -78,6 +78,25 @@ def test_a_section_of_a_step_shows_its_height_and_length() -> None:
     assert cut.height_mm[30] == pytest.approx(10.0, abs=1e-3)
 
 
+def test_a_section_along_a_step_is_on_either_surface_and_not_between() -> None:
+    """The line crosses from one row to the next, over a step of 100 mm between the two."""
+    depth = np.where(np.arange(48)[:, None] <= 24, 600.0, 700.0) * np.ones(SHAPE)
+    points = _rays() * depth
+    cut = section(points, np.full(SHAPE, 0.3), (2, 24), (61, 25))
+    assert cut is not None
+    first, base = points[:, 24, 2], points[:, 25, 61] - points[:, 24, 2]
+    along = base / np.linalg.norm(base)
+    across = -first + (first @ along) * along
+    across /= np.linalg.norm(across)
+    found = first[2] + along[2] * cut.along_mm + across[2] * cut.height_mm
+    assert np.minimum(abs(found - 600), abs(found - 700)).max() < 0.01
+    slope = points.copy()
+    slope[:, 25:] = _rays()[:, 25:] * 600.5
+    cut = section(slope, np.full(SHAPE, 0.3), (2, 24), (61, 25))
+    assert cut is not None
+    assert np.abs(cut.height_mm).max() < 0.05, "what is no step is mixed"
+
+
 def test_heights_of_a_section_vary_as_stated_with_the_ends_of_its_line() -> None:
     rng, points, std = np.random.default_rng(0), _tilted(20.0), np.full(SHAPE, 0.3)
     heights = []
