@@ -124,8 +124,9 @@ def colours_of(
 ) -> list[Colour]:
     """The colour of each spectrum (values and deviations, bands each) under each light.
 
-    A band that is missing (NaN) is taken to lie between its neighbours, if these are near. Deviations that
-    are all NaN are not known: no colour has one then, and differences have that of the other, or none.
+    A band that is missing (NaN) is taken to lie between its neighbours, if these are near. Where a
+    deviation of the others is not known (NaN), a colour has none, and differences have that of the other, or
+    none.
     ``correlation`` (bands, bands) says how bands err together; the usual one of a result otherwise.
     Differences are to the spectrum named ``reference``. Raises `DecodeError` for unknown lights or names, and
     for a spectrum whose known bands hold too little of a colour.
@@ -135,10 +136,11 @@ def colours_of(
     shared = usual_correlation(bands_nm) if correlation is None else correlation
     found = []
     for light in lights:
-        labs, sure = {}, {name: bool(np.isfinite(std).any()) for name, (_, std) in spectra.items()}
+        labs, sure = {}, {}
         for name, (values, std) in spectra.items():
             known = known_bands(values)
             require_bands(bands_nm[known], light, "" if known.all() else f" of {name!r}")
+            sure[name] = bool(np.isfinite(std[known]).all())
             own = xyz_weights(bands_nm[known], light), shared[np.ix_(known, known)]
             labs[name] = _lab_with_covariance(values[known], std[known], *own)
         for name, (lab, covariance) in labs.items():

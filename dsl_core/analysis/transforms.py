@@ -33,8 +33,8 @@ def transformed(
 
     Deviations are propagated with the correlation that bands at ``nm`` usually have; the level, for instance,
     leaves a normalised spectrum. To first order, but for the continuum: noise lifts it to its own peaks, so
-    that deviations contain by how much. Without deviations there are none. A spectrum that is not finite, or
-    has no level, stays as it is or becomes NaN.
+    that deviations contain by how much. Without deviations there are none; where one is not known (NaN), none
+    of the answer is. A spectrum that is not finite, or has no level, stays as it is or becomes NaN.
     """
     values = np.asarray(mean, np.float64)
     spread = None if std is None else np.asarray(std, np.float64)
@@ -43,13 +43,15 @@ def transformed(
     if len(values) < 3 or not np.isfinite(values).all():
         return np.full(len(values), np.nan), None if spread is None else np.full(len(values), np.nan)
     bands_nm = np.asarray(nm, np.float64)
+    if spread is not None and not np.isfinite(spread).all():
+        return transformed(nm, mean, None, transform)[0], np.full(len(values), np.nan)
     if transform is Transform.CONTINUUM:
         found = _continuum_removed(bands_nm, values)
-        return found, None if spread is None else _drawn(bands_nm, values, np.nan_to_num(spread), found)
+        return found, None if spread is None else _drawn(bands_nm, values, spread, found)
     found, slope = _FUNCTIONS[transform](bands_nm, values)
     if spread is None:
         return found, None
-    factor = slope * np.nan_to_num(spread)
+    factor = slope * spread
     variance = np.einsum("ij,jk,ik->i", factor, usual_correlation(nm), factor)
     return found, np.sqrt(np.maximum(variance, 0))
 

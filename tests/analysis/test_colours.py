@@ -78,6 +78,15 @@ def test_a_difference_of_colours_without_deviations_has_none() -> None:
     assert table.rows[1][-1].endswith(f"± {sure.delta_e_std:.2f}")
 
 
+def test_a_colour_is_not_sure_to_less_than_bands_of_unknown_deviation_make_it() -> None:
+    values, std = chart_reflectance(NM)["foliage"], np.where(NM < 600, np.nan, 0.01)
+    found = colours_of({"x": (values, std), "y": (np.where(NM < 440, np.nan, values), std)}, NM, ("D65",))
+    assert all(math.isnan(each) for colour in found for each in colour.lab_std)
+    masked = np.where(NM == 500, np.nan, 0.01)
+    sure = colours_of({"x": (np.where(NM == 500, np.nan, values), masked)}, NM, ("D65",))[0]
+    assert all(each > 0.1 for each in sure.lab_std)
+
+
 def test_unknown_lights_and_names_are_told() -> None:
     spectra = {"x": (np.ones(len(NM)), np.zeros(len(NM)))}
     with pytest.raises(DecodeError, match="no light 'candle'"):

@@ -63,3 +63,14 @@ def test_what_has_no_shape_is_not_a_number() -> None:
     assert np.isnan(values).all()
     assert std is not None
     assert np.isnan(transformed(NM, np.full(len(NM), np.nan), None, Transform.CONTINUUM)[0]).all()
+
+
+@pytest.mark.parametrize("transform", [Transform.NORMALISED, Transform.DERIVATIVE, Transform.CONTINUUM])
+def test_what_follows_from_deviations_that_are_not_known_is_not_known(transform: Transform) -> None:
+    for unknown in (slice(None), 20):
+        some = STD.copy()
+        some[unknown] = np.nan
+        values, std = transformed(NM, MEAN, some, transform)
+        assert np.isfinite(values).all()
+        assert std is not None
+        assert np.isnan(std).all()
