@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dsl_core.analysis.library import SpectralLibrary
 from dsl_core.errors import CalibrationError, DecodeError
+from dsl_core.evaluation.marks import left_of_variance
 from dsl_core.model.result import SPECTRUM_INVALID, Flag
 from dsl_core.model.spectral import at_bands
 
@@ -24,10 +25,6 @@ MOST_MEMBERS = 8
 MOST_COMPONENTS = 3
 #: The share of a class's variance that its components have to explain.
 _EXPLAINED = 0.99
-#: Noise of neighbouring pixels hangs together over about this many of them.
-_PIXELS_TOGETHER = 9
-#: The part of a pixel's variance that no number of pixels averages out, because all have it in common.
-_IN_COMMON = 0.05
 #: The part of a library's error that bands do not have in common.
 BAND_SHARE = 0.25
 #: A class that varies by more than this share of its reflectance is doubted.
@@ -176,8 +173,7 @@ def class_of_pixels(
             )
         raise DecodeError(f"{name}: none of its {len(y)} pixels has a spectrum. Mark another place.")
     noise = np.mean(spread**2, axis=1)
-    averaged = max(min(_PIXELS_TOGETHER / count, 1.0), _IN_COMMON)
-    member = Member.of(values.mean(1), np.sqrt(noise * averaged))
+    member = Member.of(values.mean(1), np.sqrt(noise * left_of_variance(count)))
     if count > 4 * len(values):
         components, rest = _more_than_noise(np.atleast_2d(np.cov(values)), noise)
         member = replace(member, std=np.sqrt(member.std**2 + rest), components=components)

@@ -60,11 +60,11 @@ class ResultAccessor:
         """Mean reflectance of a region and its standard deviation over ``wavelength_nm``.
 
         ``where`` is a mask (rows, columns), or x, y, width and height in pixels of the whole picture.
-        ``reflectance_std`` is the scatter of the region's pixels (that of their mean is smaller by the
-        root of their number, as far as errors are independent), ``pixel_std`` the mean deviation stated
-        for a single pixel; where only one has a spectrum, both are what is stated for it. The attribute
-        ``used`` counts the pixels with a spectrum. What the result does not state is NaN. Raises
-        `DecodeError` for a region without any.
+        ``reflectance_std`` is the scatter of the region's pixels, ``pixel_std`` the mean deviation stated
+        for a single pixel, ``mean_std`` what their mean is uncertain by: errors of neighbours hang
+        together, so it is more than ``pixel_std`` over the root of their number. Where only one has a
+        spectrum, all are what is stated for it. The attribute ``used`` counts the pixels with a spectrum.
+        What the result does not state is NaN. Raises `DecodeError` for a region without any.
         """
         self._require_spectra()
         require_picture(self._result)
@@ -85,6 +85,7 @@ class ResultAccessor:
                     ("reflectance", found.mean, "mean reflectance on the Spectralon scale"),
                     ("reflectance_std", found.spread, "standard deviation of the pixels"),
                     ("pixel_std", found.pixel_std, "mean standard deviation stated for a pixel"),
+                    ("mean_std", found.mean_std, "standard deviation of the mean"),
                     ("data_share", found.data_share, "mean share decided by data"),
                 )
             },

@@ -15,6 +15,10 @@ from dsl_core.model.result import REASONS, Flag
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32] | NDArray[np.float64]
+#: Noise of neighbouring pixels hangs together over about this many of them.
+_PIXELS_TOGETHER = 9
+#: The part of a pixel's variance that no number of pixels averages out, because all have it in common.
+_IN_COMMON = 0.05
 #: Of fifty bands one is so many deviations off by chance in one of three hundred pairs.
 SHOWN_FROM = 4.0
 
@@ -70,6 +74,15 @@ def mask_of_runs(runs: Iterable[tuple[int, int, int]], shape: tuple[int, int]) -
     return mask
 
 
+def left_of_variance(pixels: int) -> float:
+    """The share of a pixel's variance that is left in the mean of so many that are next to each other.
+
+    >>> left_of_variance(1), left_of_variance(36), left_of_variance(10_000)
+    (1.0, 0.25, 0.05)
+    """
+    return max(min(_PIXELS_TOGETHER / pixels, 1.0), _IN_COMMON)
+
+
 @dataclass(frozen=True)
 class RegionSpectrum:
     """Mean reflectance of a region and the deviation of its pixels, of shape (bands,); NaN without pixels.
@@ -90,6 +103,11 @@ class RegionSpectrum:
     def spread(self) -> NDArray[np.float64]:
         """How its pixels differ, (bands,); of a single pixel, the deviation stated for it."""
         return self.pixel_std if self.used == 1 else self.deviation
+
+    @property
+    def mean_std(self) -> NDArray[np.float64]:
+        """What the mean is uncertain by, (bands,), as stated deviations hang together from pixel to pixel."""
+        return self.pixel_std * np.sqrt(left_of_variance(max(self.used, 1)))
 
 
 def region_spectrum(reflectance: Floats, std: Floats, data_share: Floats, mask: Mask) -> RegionSpectrum:

@@ -46,7 +46,8 @@ def test_what_a_result_does_not_state_is_unknown_and_the_rest_is_told(
         assert set(found.data_vars) == set(known.data_vars)
     is_known = name != "reflectance_std"
     assert bool(less.dsl.spectrum(4, 3)["reflectance_std"].notnull().all()) is is_known
-    assert bool(less.dsl.region((1, 1, 3, 2))["pixel_std"].notnull().all()) is is_known
+    for deviation in ("pixel_std", "mean_std"):
+        assert bool(less.dsl.region((1, 1, 3, 2))[deviation].notnull().all()) is is_known
     assert bool(less.dsl.spectrum(4, 3)["data_share"].notnull().all()) is (name != "data_share")
     assert less.dsl.reasons(4, 3) == []
     assert bool(less.dsl.reasons(4, 2)) is (name != "flags")

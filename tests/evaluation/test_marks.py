@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scipy.ndimage import uniform_filter
 
 from dsl_core.evaluation.marks import (
     distance_between,
@@ -63,6 +64,21 @@ def test_a_region_leaves_pixels_without_spectrum_out() -> None:
     none = region_spectrum(cube, cube, cube, np.zeros((2, 2), bool))
     assert none.used == 0
     assert np.isnan(none.mean).all()
+
+
+def test_a_mean_of_neighbours_is_as_uncertain_as_it_scatters_from_scan_to_scan() -> None:
+    rng, mask = np.random.default_rng(4), np.zeros((20, 20), bool)
+    mask[4:14, 5:17] = True
+    # Noise that three by three pixels have together, as those of a Bayer mosaic do.
+    noise = 0.01 * 3 * uniform_filter(rng.standard_normal((300, 20, 20)), (0, 3, 3))
+    std = np.full((1, 20, 20), 0.01)
+    shots = [region_spectrum(0.5 + each[None], std, std, mask) for each in noise]
+    scattered = float(np.std([shot.mean[0] for shot in shots]))
+    assert shots[0].mean_std[0] == pytest.approx(scattered, rel=0.2)
+    assert scattered > 2 * float(np.mean([shot.deviation[0] for shot in shots])) / np.sqrt(mask.sum())
+    one = np.zeros_like(mask)
+    one[3, 3] = True
+    assert region_spectrum(0.5 + noise[:1], std, std, one).mean_std[0] == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("band", [0, 1, 2])
