@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.plausible import require_transmission
 from dsl_core.errors import DslError
 from dsl_core.model.placement import Placement
 
@@ -63,10 +64,7 @@ class RigParts:
         with self.open_rig() as rig:
             for nm, curve in rig.filters.items():
                 values, at = np.array(curve.values), np.array(curve.wavelengths_nm)
-                require(
-                    bool((values >= -0.02).all() and (values <= 1.05).all() and values.max() > 0),
-                    f"the filter of {nm:g} nm passes {values.min():g} to {values.max():g}, not a share",
-                )
+                require_transmission(curve, nm)
                 peak = float(at[values.argmax()])
                 require(abs(peak - nm) < 40, f"the filter of {nm:g} nm passes most at {peak:g} nm")
 

@@ -25,6 +25,8 @@ FEWEST_SAMPLES, CLIPPED_SAMPLES = 16, 6
 STEEP_STEPS, MOST_DIGITS = 10.0, 6
 #: A spectrum of light may fall below zero by this share of its peak.
 NEGATIVE_SHARE = 0.1
+#: What the measured transmission of a filter may be: noise takes it a little beyond 0 and 1.
+TRANSMISSIONS = (-0.02, 1.05)
 #: Unit of a spectroradiometer's curves.
 RADIANCE = "W/(sr m2 nm)"
 
@@ -145,6 +147,18 @@ def require_light(curve: SpectralCurve, others: Mapping[Any, SpectralCurve], wha
         raise DeviceError(
             f"{name} delivered no spectrum of {what}: {fault}. Check that it sees the target and that the"
             " projector follows, then measure again."
+        )
+
+
+def require_transmission(curve: SpectralCurve, filter_nm: float) -> None:
+    """Raise `DeviceError` unless a curve can be what the filter of a nominal centre passes, as a share."""
+    least, most = min(curve.values), max(curve.values)
+    # Written so that a figure that is no number is refused as well.
+    if not (TRANSMISSIONS[0] <= least and 0 < most <= TRANSMISSIONS[1]):
+        raise DeviceError(
+            f"The rig says that the filter of {filter_nm:g} nm passes {least:g} to {most:g} of the light; a"
+            " share from 0 to 1 is wanted. Correct its measured transmission in the rig's driver (filters):"
+            " divide percent by 100."
         )
 
 

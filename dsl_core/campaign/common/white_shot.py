@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.orders.filter_check import colour_shift
 from dsl_core.campaign.common.recipe import Bench
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.plausible import require_transmission
 from dsl_core.errors import CalibrationError
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import mosaic_colours
@@ -204,8 +205,13 @@ def require_width(fwhm_nm: float, title: str) -> None:
 
 
 def note_of_filter(devices: DeviceRig, filter_nm: float, fwhm_nm: float = FWHM_NM) -> FilterNote:
-    """What is known of a rig's filter: its measured transmission, or a nominal one of a width."""
+    """What is known of a rig's filter: its measured transmission, or a nominal one of a width.
+
+    Raises `DeviceError` where what was measured cannot be a transmission.
+    """
     curve = devices.filters.get(filter_nm)
+    if curve is not None:
+        require_transmission(curve, filter_nm)
     return FilterNote(
         filter_nm=filter_nm,
         transmission=curve or nominal_filter(filter_nm, fwhm_nm),

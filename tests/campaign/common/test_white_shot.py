@@ -22,7 +22,7 @@ from dsl_core.campaign.common.white_shot import (
     require_width,
     shoot_white,
 )
-from dsl_core.errors import CalibrationError
+from dsl_core.errors import CalibrationError, DeviceError
 from dsl_core.model.figure import failures
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
@@ -120,6 +120,11 @@ def test_filters_that_nobody_measured_are_as_wide_as_stated(bench: Bench) -> Non
     assert note_of_filter(devices, 450.0, 20.0).transmission == nominal_filter(450.0, 20.0)
     measured = replace(bench.devices, filters={450.0: nominal_filter(451.0, 9.0)})
     assert note_of_filter(measured, 450.0, 20.0).transmission == nominal_filter(451.0, 9.0)
+    curve = nominal_filter(451.0, 9.0)
+    percent = curve.model_copy(update={"values": tuple(100 * value for value in curve.values)})
+    devices = replace(bench.devices, filters={450.0: percent})
+    with pytest.raises(DeviceError, match=r"filter of 450 nm passes .* of the light; a share .* percent"):
+        note_of_filter(devices, 450.0)
     require_width(2.0, "It")
     for fwhm_nm in (0.0, 1.9, 51.0):
         with pytest.raises(CalibrationError, match=rf"It: fwhm_nm={fwhm_nm:g} was given.*2 to 50 nm"):
