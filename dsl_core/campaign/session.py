@@ -179,6 +179,7 @@ class CalibrationSession:
             name=self.recipe.name,
             title=self.recipe.title,
             captured=self._captured(),
+            light=min(self._finished([s for s in self.steps if self.recipe.measures_light(s)]), default=""),
             conditions=current_conditions(self.devices),
             settings=self._settings(),
             based_on=self.based_on,
@@ -225,10 +226,14 @@ class CalibrationSession:
     def _captured(self) -> str:
         """When the newest captures were finished; empty where there are none, or it is not known."""
         try:
-            notes = [read_note(self._folder(step)) for step in self.steps]
+            return max(self._finished(self.steps), default="")
         except StoreError:
             return ""
-        return max((note.finished for note in notes if note is not None), default="")
+
+    def _finished(self, steps: Sequence[Step]) -> list[str]:
+        """When the captures of each of these steps were finished, as far as there are any."""
+        notes = [read_note(self._folder(step)) for step in steps]
+        return [note.finished for note in notes if note is not None]
 
     def _captured_before(self) -> str:
         """The same of what the accepted calibration was fitted to: a step that is redone is moved aside."""

@@ -33,7 +33,7 @@ CHECKED_REL_STD = 0.005
 DEFAULT_CHECKS = 3.0
 #: Changes of the light between two checks on one day tell of the checks, not of age.
 LEAST_DAYS = 1.0
-#: The calibration that measures the level of the light.
+#: The calibration that measures the level of the light in rigs whose calibrations do not say when they did.
 LIGHT = "spectralon"
 
 
@@ -141,8 +141,12 @@ def wander_per_root_day(checks: tuple[LightCheck, ...]) -> float:
 
 
 def light_calibrated(rig: Rig) -> str:
-    """When the level of a rig's light was calibrated, ISO 8601; empty where nobody noted it."""
+    """When the level of a rig's light was calibrated, ISO 8601; empty where nobody noted it.
+
+    Each calibration that measures it replaces what those before it found.
+    """
     dates = [note.measured for note in rig.calibrations if note.name == LIGHT]
+    dates += [note.light for note in rig.calibrations if note.light]
     return dates[-1] if dates else rig.provenance.created
 
 
@@ -184,13 +188,20 @@ def _of_light(rig: Rig, captured: str) -> str:
         change, std = level.check.largest_change, level.check.std
         found = f"The drift check of {level.check.checked[:10]} found the light {change:+.1%} ± {std:.1%} off"
         if abs(change) > max(2 * std, 0.01):
-            return f"{found}: reflectance is off by as much. Calibrate with the Spectralon again."
+            return f"{found}: reflectance is off by as much. {_calibrate_light(rig)}"
         if level.days <= FRESH.days:
             return ""
         return f"The light was last checked {_apart(rig, captured, level)} this scan, and {known}{remedy}"
     if level.days <= FRESH.days:
         return ""
     return f"The light was calibrated {_apart(rig, captured, level)} this scan, and {known}{remedy}"
+
+
+def _calibrate_light(rig: Rig) -> str:
+    """What to do about light that is not as calibrated."""
+    others = [repr(note.title) for note in rig.calibrations if note.light and note.name != LIGHT]
+    more = f", and capture {' and '.join(others)} again, which rest on its level as well" if others else ""
+    return f"Calibrate with the Spectralon again{more}."
 
 
 def _apart(rig: Rig, captured: str, level: LightLevel) -> str:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from dsl_core.campaign.bandpass.recipe import BandpassRecipe
+from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.depth_stage.recipe import DepthStageRecipe
 from dsl_core.campaign.recipes import _build, _value, load_recipe, recipe_names
 from dsl_core.campaign.spectralon.recipe import SpectralonRecipe
 from dsl_core.errors import CalibrationError
+from dsl_core.model.placement import Placement
 from tests.cases.fake_recipe import FakeRecipe
 
 
@@ -18,6 +20,19 @@ def test_every_recipe_has_its_name_and_needs_only_earlier_ones() -> None:
         recipe = load_recipe(name)
         assert recipe.name == name
         assert set(recipe.needs) <= set(names[:index])
+
+
+def test_light_is_measured_by_what_shows_it_without_a_filter() -> None:
+    def light(recipe: AnyRecipe, key: str, filter_nm: float | None = None) -> bool:
+        place = Placement(target="spectralon", film=True, filter_nm=filter_nm)
+        return recipe.measures_light(Step(key, "It", "Do it.", place))
+
+    assert [light(SpectralonRecipe(), key) for key in ("emission", "pictures")] == [False, True]
+    assert [light(BandpassRecipe(), "plane"), light(BandpassRecipe(), "filter-450", 450.0)] == [True, False]
+    assert light(DepthStageRecipe(), "plane-620")
+    assert not light(DepthStageRecipe(chain=False), "plane-620")
+    assert not light(DepthStageRecipe(), "filter-450", 450.0)
+    assert not light(FakeRecipe(), "bright")
 
 
 @pytest.mark.parametrize(

@@ -120,6 +120,17 @@ def test_the_accepted_one_before_is_history(devices: DeviceRig, campaign: Campai
         run_calibration(one, guide, NoProgress(), redo=["night"])
 
 
+def test_light_is_as_old_as_the_captures_that_show_it(
+    devices: DeviceRig, campaign: CampaignFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FakeRecipe, "measures_light", lambda self, step: step.key == "bright")
+    one = session(devices, campaign, FakeRecipe())
+    old = run_calibration(one, Willing(), NoProgress())
+    new = run_calibration(one, Willing(), NoProgress(), redo=["dim"])
+    assert old.light == old.captured == new.note.light < new.captured
+    assert run_calibration(one, Willing(), NoProgress(), redo=["bright"]).light > old.light
+
+
 @pytest.mark.parametrize("clock", ["runs", "is set back"])
 def test_new_captures_whose_fit_nobody_accepted_are_not_passed_over(
     devices: DeviceRig, campaign: CampaignFolder, clock: str, monkeypatch: pytest.MonkeyPatch

@@ -128,6 +128,24 @@ def test_a_light_that_a_check_found_changed_is_contained_and_told() -> None:
     assert one.largest_change == pytest.approx(-0.06)
 
 
+def test_the_last_calibration_that_measures_the_light_says_how_bright_it_is() -> None:
+    """The bandpass filters replace what the Spectralon found, with the level that their own captures saw."""
+    check, again = checked("2026-03-20T10:00:00+00:00", 0.95), "2026-03-21T10:00:00+00:00"
+    for spectralon, bandpass in ((THREE_WEEKS, again), (again, THREE_WEEKS)):
+        notes = (
+            CalibrationNote(name="spectralon", title="Spectralon", accepted=SCANNED, light=spectralon),
+            CalibrationNote(name="color-checker", title="Color Checker", accepted=SCANNED, captured=SCANNED),
+            CalibrationNote(name="bandpass", title="Bandpass filters", accepted=SCANNED, light=bandpass),
+        )
+        rig = with_checks(check).model_copy(update={"calibrations": notes})
+        said = unseen_since(rig, SCANNED)
+        if bandpass == again:
+            assert said == ""
+        else:
+            assert "found the light -5.0% ± 0.0% off" in said
+            assert "Calibrate with the Spectralon again, and capture 'Bandpass filters' again" in said
+
+
 def test_checks_of_long_ago_are_told_with_their_age() -> None:
     rig = with_checks(checked("2026-03-06T10:00:00+00:00", 1.0))
     assert "The light was last checked 16 days before this scan" in unseen_since(rig, SCANNED)

@@ -95,7 +95,7 @@ def light_drift(rig: Rig, white: PlaneSignals, reflectance: SpectralCurve) -> li
                 high=1 + LIGHT_LIMIT,
                 advice="Light or exposure has changed, or the target is not the white that it was calibrated"
                 " with: let the projector warm up and clean the target; otherwise repeat the spectralon"
-                " calibration.",
+                " calibration, and capture those after it again, which measure the light as well.",
             )
         )
     return figures

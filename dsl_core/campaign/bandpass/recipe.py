@@ -128,6 +128,10 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
             return figures
         return (*figures, colour_figure(bench.rig, white, note_of_filter(bench.devices, nm, self.fwhm_nm)))
 
+    def measures_light(self, step: Step) -> bool:
+        """The target without filter does, whatever the Spectralon said before."""
+        return step.key == PLANE
+
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose exposures by a test shot and scan; a scan that was begun keeps its own exposures."""
         bench.scan(step, lambda: self._begin(bench, step), progress)

@@ -144,6 +144,10 @@ class Recipe(ABC, Generic[RecordT]):
         """Whether the captures of a step, a scan unless a recipe says otherwise, are complete."""
         return bench.is_scanned(step)
 
+    def measures_light(self, step: Step) -> bool:
+        """Whether the captures of a step say how bright the light of the calibrated rig is."""
+        return False
+
     @abstractmethod
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Capture a step into its folder; continues captures that an earlier call left unfinished."""

@@ -151,6 +151,10 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         self._move(bench, step)
         return film_light(shoot_white(bench), bench.rig)
 
+    def measures_light(self, step: Step) -> bool:
+        """The lines without filter do, where they correct the chain."""
+        return self.chain and step.placement.filter_nm is None
+
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Move the stage, choose exposures by a test shot, and scan; a scan that was begun continues.
 

@@ -95,6 +95,10 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
         """Whether all spectra are read, from the folder if one is named, or the scan is complete."""
         return is_read(bench, step, self._files()) if step.key == EMISSION else bench.is_scanned(step)
 
+    def measures_light(self, step: Step) -> bool:
+        """The pictures do: of the spectra only their shapes count."""
+        return step.key == PICTURES
+
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Read spectra, or choose exposures by a test shot and capture."""
         if step.key == EMISSION:

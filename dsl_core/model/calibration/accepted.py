@@ -25,13 +25,15 @@ class CalibrationNote(Record):
     """What a calibrated rig remembers of one calibration: when it was accepted and what it reached.
 
     ``captured`` is when its pictures were taken, empty where nobody noted it: they may have been fitted again
-    long after.
+    long after. ``light`` is when those were taken that say how bright the light is, empty for a calibration
+    without any.
     """
 
     name: str
     title: str
     accepted: str
     captured: str = ""
+    light: str = ""
     figures: tuple[Figure, ...] = ()
 
     @property
@@ -88,6 +90,7 @@ class AcceptedCalibration(Record):
     title: str
     accepted: str = ""
     captured: str = ""
+    light: str = ""
     conditions: CaptureConditions | None = None
     settings: dict[str, str] = Field(default_factory=dict)
     based_on: dict[str, str] = Field(default_factory=dict)
@@ -102,5 +105,6 @@ class AcceptedCalibration(Record):
             title=self.title,
             accepted=self.accepted,
             captured=self.captured,
+            light=self.light,
             figures=self.figures,
         )
