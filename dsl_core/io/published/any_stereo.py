@@ -16,9 +16,9 @@ from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.stereo import COLUMNS_ONLY, Size, Stereo, five_coefficients, lens_of
-from dsl_core.io.published.stereo_names import Numbers, Parts, parts_of, size_of
+from dsl_core.io.published.stereo_names import Numbers, Parts, parts_of, size_of, units_of
 from dsl_core.io.published.stereo_words import doubts, understood
-from dsl_core.io.published.tree_file import read_nodes
+from dsl_core.io.published.tree_file import read_nodes, read_texts
 from dsl_core.model.base import problems_in_words
 from dsl_core.model.geometry import Pose
 
@@ -64,9 +64,10 @@ def load_any_stereo(
 ) -> FoundStereo:
     """Read lenses and pose from any file that names them; lengths are in units of ``unit_mm``.
 
-    Sizes (width, height) are those of the file where they are not given; with ``inverse`` its pose leads from
-    projector to camera. Raises `CalibrationError` that says which parts are missing, what they may be called,
-    and which names the file has, or that sizes differ from those of the file.
+    A file that states its unit is read in that. Sizes (width, height) are those of the file where they are
+    not given; with ``inverse`` its pose leads from projector to camera. Raises `CalibrationError` that says
+    which parts are missing, what they may be called, and which names the file has, or that sizes or units
+    differ from those of the file.
     """
     nodes = read_nodes(path)
     _require_pinhole(path)
@@ -89,6 +90,7 @@ def load_any_stereo(
             " that neither leads from one to the other. Give one R and T from camera to projector instead:"
             " for poses x = R X + t of points X of the world, R = Rp Rc^T and T = tp - R tc."
         )
+    unit_mm = _unit_mm(path, unit_mm)
     given = {"camera": camera_size_px, "projector": projector_size_px}
     try:
         camera, projector = (
@@ -120,6 +122,25 @@ def _require_pinhole(path: Path) -> None:
             f"{path} describes a lens by the model {model!r}; only a pinhole with the distortion k1 k2 p1"
             " p2 k3 is possible. Calibrate with that model."
         )
+
+
+def _unit_mm(path: Path, given_mm: float) -> float:
+    """The unit of lengths that a file states, otherwise the given one; raises `CalibrationError`."""
+    texts = read_texts(path)
+    stated = units_of(texts)
+    said = ", ".join(f"{name} {texts[name]!r}" for name in stated)
+    if None in stated.values() or len(set(stated.values())) > 1:
+        raise CalibrationError(
+            f"{path} states the unit of its lengths by {said}; one of um, mm, cm, dm, m, in, ft is needed."
+            " Correct the file, or remove that from it and give --unit-mm."
+        )
+    unit_mm = next((each for each in stated.values() if each), given_mm)
+    if given_mm not in (1.0, unit_mm):
+        raise CalibrationError(
+            f"{path} states {said}, which is {unit_mm:g} mm, not {given_mm:g} mm as given. Give no other unit"
+            " than the file, or correct that."
+        )
+    return unit_mm
 
 
 def _size(path: Path, numbers: Numbers, device: str, given: Size | None) -> Size:

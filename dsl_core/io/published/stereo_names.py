@@ -31,8 +31,22 @@ _SHIFT = r"(?:t|trans|translation|tvec|tmat|translationvector|tp|translationofca
 _BOTH = r"(?:tcncnm1|cam1tcncnm1|transform(?:ation)?(?:matrix)?|extrinsics?(?:matrix)?|rt|pose|posecamera2a)"
 #: Sizes with such names are counted in squares or corners.
 _OF_TARGET = re.compile(r"(?i)board|pattern|target|grid|corner|square")
-#: Numbers of coefficients that OpenCV knows.
-_COEFFICIENTS = {4, 5, 8, 12, 14}
+#: Names that are neither of a matrix nor of a distance.
+_SURE = r"(?:camera)?(?:distortion|dist(?:ortion)?coeff?(?:icient)?s?|kc)"
+#: Names of what says the unit of lengths, and what says that of something else.
+_UNIT = r"(?:world|length|distance|translation|baseline|board|square|target|pattern|size|pose|t)?units?"
+_OTHER_UNIT = re.compile(
+    r"(?i)pixel|sensor|focal|angle|rotation|image|\A(?:px|deg(?:rees?)?|rad(?:ians?)?|)\Z"
+)
+_UNITS_MM = {
+    "um|µm|micrometers?|micrometres?|microns?": 0.001, "mm|millimeters?|millimetres?": 1.0,
+    "cm|centimeters?|centimetres?": 10.0, "dm|decimeters?|decimetres?": 100.0, "m|meters?|metres?": 1000.0,
+    "in|inch|inches": 25.4, "ft|foot|feet": 304.8,
+}  # fmt: skip
+#: Any other lengths are those of a distortion that has to be refused, if not of a matrix or a lone distance.
+_COEFFICIENTS = set(range(2, 100)) - {9}
+#: Coefficients that have a name each, in OpenCV's order.
+_TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 
 @dataclass
@@ -85,6 +99,17 @@ def size_of(numbers: Numbers, device: str) -> tuple[int, int] | None:
     return width, height
 
 
+def units_of(texts: Mapping[str, str]) -> dict[str, float | None]:
+    """Units of lengths that a file states by their names, mm; None for words that are no unit of length."""
+    stated: dict[str, float | None] = {}
+    for name, text in texts.items():
+        is_other = any(_OTHER_UNIT.search(each) for each in (name, text.strip()))
+        if not is_other and re.fullmatch(_UNIT, _plain(name.split(".")[-1])):
+            fits = (mm for words, mm in _UNITS_MM.items() if re.fullmatch(words, text.strip(" .").lower()))
+            stated[name] = next(fits, None)
+    return stated
+
+
 def _of_pair(numbers: Numbers, camera: str, projector: str) -> Parts:
     """The lenses that a file has under one pair of names."""
     found, is_told = Parts(), (camera, projector) == _PAIRS[0]
@@ -102,16 +127,35 @@ def _add_lens(found: Parts, numbers: Numbers, device: str, who: str, alone: str 
     name = _named(numbers, f"{who}{_MATRIX}|{_MATRIX}{who}", {9, 4})
     if name is not None:
         _add_matrix(found, f"{device} matrix", name, numbers[name].ravel())
-    name = _named(numbers, f"{who}{_DISTORTION}|{_DISTORTION}{who}{alone}", _COEFFICIENTS)
-    if name is not None and name != found.names.get(f"{device} matrix"):
-        found.add(f"{device} distortion", name, numbers[name].ravel())
-    radial = _named(numbers, f"{who}radialdistortion", {2, 3})
-    tangential = _named(numbers, f"{who}tangentialdistortion", {2})
-    if radial is not None:
+    matrix = found.names.get(f"{device} matrix")
+    _add_distortion(found, {n: v for n, v in numbers.items() if n != matrix}, device, who, alone)
+
+
+def _add_distortion(found: Parts, numbers: Numbers, device: str, who: str, alone: str) -> None:
+    """Coefficients in OpenCV's order, as many as there are; up to three are radial, with tangential ones."""
+    part, words = f"{device} distortion", f"{who}{_DISTORTION}|{_DISTORTION}{who}{alone}"
+    name = (
+        _named(numbers, f"{who}radialdistortion", {1, 2, 3})
+        or _named(numbers, words, _COEFFICIENTS)
+        or _named(numbers, f"{who}{_SURE}|{_SURE}{who}{alone}", {1, 9})
+    )
+    if name is None:
+        terms = [_named(numbers, f"{who}(?:{_DISTORTION})?{term}", {1}) for term in _TERMS]
+        named = ", ".join(each for each in terms if each)
+        if named:
+            found.add(part, named, np.array([numbers[each].item() if each else 0.0 for each in terms]))
+        return
+    values = numbers[name].ravel()
+    if values.size < 4:
+        tangential = _named(numbers, f"{who}tangentialdistortion", {2})
         if tangential is None:
-            found.taken.append(f"{radial} is without tangential distortion")
-        k, p = numbers[radial].ravel(), np.zeros(2) if tangential is None else numbers[tangential].ravel()
-        found.add(f"{device} distortion", radial, np.r_[k[:2], p, k[2:], np.zeros(3 - k.size)])
+            found.taken.append(f"{name} is without tangential distortion")
+        k, p = (
+            np.pad(values, (0, 3 - values.size)),
+            numbers[tangential].ravel() if tangential else np.zeros(2),
+        )
+        values = np.r_[k[:2], p, k[2:]]
+    found.add(part, name, values)
 
 
 def _add_matrix(found: Parts, part: str, name: str, values: NDArray[np.float64]) -> None:

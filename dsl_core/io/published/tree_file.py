@@ -39,6 +39,17 @@ def read_nodes(path: Path) -> dict[str, Node]:
     What is neither, such as a date or a matrix with numbers missing, is None. Raises `CalibrationError` for a
     file that is not there, or is none of these formats.
     """
+    return {name: _node(value) for name, value in _values(path).items()}
+
+
+def read_texts(path: Path) -> dict[str, str]:
+    """What a file says in words by its name; raises `CalibrationError` as `read_nodes` does."""
+    values = {name: " ".join(value) if _is_lone(value) else value for name, value in _values(path).items()}
+    return {name: value for name, value in values.items() if isinstance(value, str) and _node(value) is None}
+
+
+def _values(path: Path) -> dict[str, Any]:
+    """Whatever a file has by its name."""
     if not path.is_file():
         raise CalibrationError(f"{path} does not exist. Give the path of the calibration's XML or YAML file.")
     try:
@@ -53,9 +64,9 @@ def read_nodes(path: Path) -> dict[str, Node]:
             f"{path} is not a calibration that can be read: it is cut off or damaged, or it is not XML, YAML"
             " or JSON. Export the calibration again."
         ) from error
-    nodes: dict[str, Node] = {}
-    _collect(tree, "", nodes, 0)
-    return nodes
+    values: dict[str, Any] = {}
+    _collect(tree, "", values, 0)
+    return values
 
 
 def _require_modest(content: bytes, path: Path) -> None:
@@ -111,13 +122,13 @@ def _of_element(element: ElementTree.Element) -> Any:
     return {child.tag: _of_element(child) for child in children}
 
 
-def _collect(value: Any, name: str, into: dict[str, Node], level: int) -> None:
+def _collect(value: Any, name: str, into: dict[str, Any], level: int) -> None:
     if isinstance(value, Mapping) and not _is_matrix(value) and level < _LEVELS:
         for key, inner in value.items():
             if len(into) < _MOST_NAMES:
                 _collect(inner, f"{name}.{key}" if name else str(key), into, level + 1)
     elif name:
-        into[name] = _node(value)
+        into[name] = value
 
 
 def _is_matrix(value: Mapping[str, Any]) -> bool:
@@ -147,9 +158,9 @@ def _node(value: Any) -> Node:
     return float(numbers.ravel()[0]) if not isinstance(value, list) or _is_lone(value) else numbers
 
 
-def _is_lone(value: list[Any]) -> bool:
-    """Whether a list is the only word of an element of XML."""
-    return len(value) == 1 and isinstance(value[0], str)
+def _is_lone(value: Any) -> bool:
+    """Whether this is the only word of an element of XML."""
+    return isinstance(value, list) and len(value) == 1 and isinstance(value[0], str)
 
 
 def _array(value: Any) -> NDArray[np.float64] | None:

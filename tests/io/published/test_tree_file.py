@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.published.tree_file import read_nodes
+from dsl_core.io.published.tree_file import read_nodes, read_texts
 
 MATRIX = np.array([[1 / 3, -1e-20, 3e5], [0, np.pi, -7.0]])
 
@@ -52,6 +52,19 @@ def test_files_of_other_programs_nest_names_and_lists(tmp_path: Path) -> None:
     np.testing.assert_array_equal(nodes["a.b"], [[1], [2]])
     assert nodes["c"] is None
     np.testing.assert_array_equal(nodes["d"], [1])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("c.yml", "a: {unit: mm, b: 2}\nnote: made in March\n"),
+        ("c.xml", "<r><a><unit>mm</unit><b>2</b></a><note>made in March</note></r>"),
+    ],
+)
+def test_what_a_file_says_in_words_has_a_name_too(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    assert {"a.unit": "mm"}.items() <= read_texts(tmp_path / name).items()
+    assert "a.b" not in read_texts(tmp_path / name)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,99 @@
+"""Calibrations that used to be misunderstood without a word are understood, doubted or refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from dsl_core.errors import CalibrationError
+from dsl_core.io.published.any_stereo import FoundStereo, load_any_stereo
+
+K = [[1200.0, 0, 640], [0, 1210, 512], [0, 0, 1]]
+P = [[1900.0, 0, 500], [0, 1905, 700], [0, 0, 1]]
+R = np.asarray(cv2.Rodrigues(np.array([0.02, 0.3, 0.01]))[0], np.float64)
+T = np.array([-200.0, 10, 40])
+LENSES = {"cam_K": K, "proj_K": P, "image_size": [1280, 1024], "projector_size": [1024, 768]}
+PLAIN = {**LENSES, "R": R.tolist(), "T": T.tolist()}
+
+
+def read(tmp_path: Path, parts: dict[str, Any], unit_mm: float = 1.0) -> FoundStereo:
+    path = tmp_path / "c.json"
+    path.write_text(json.dumps(parts, default=lambda each: each.tolist()), encoding="utf-8")
+    return load_any_stereo(path, unit_mm=unit_mm)
+
+
+@pytest.mark.parametrize(
+    ("named", "coefficients"),
+    [
+        ({"cam_kc": [-0.1, 0.02]}, (-0.1, 0.02, 0, 0, 0)),
+        ({"cam_kc": [-0.1, 0.02, 0.003]}, (-0.1, 0.02, 0, 0, 0.003)),
+        ({"cam_kc": -0.1}, (-0.1, 0, 0, 0, 0)),
+        ({"cam_kc": [-0.1, 0.02, 0.001, 0.002, 0, 0]}, (-0.1, 0.02, 0.001, 0.002, 0)),
+        (
+            {"camera": {"k1": -0.1, "k2": 0.02, "p1": 0.001, "p2": 0.002, "k3": 0.003}},
+            (-0.1, 0.02, 0.001, 0.002, 0.003),
+        ),
+        ({"camera": {"distortion": {"k1": -0.1}}}, (-0.1, 0, 0, 0, 0)),
+    ],
+)
+def test_distortion_of_any_length_is_read(
+    tmp_path: Path, named: dict[str, Any], coefficients: tuple[float, ...]
+) -> None:
+    found = read(tmp_path, {**PLAIN, **named})
+    assert found.stereo.camera.distortion == coefficients
+    assert found.assumed == ("no projector distortion",)
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        {"cam_kc": [-0.1, 0.02, 0.001, 0.002, 0, 0.1]},
+        {"cam_dist_coeffs": [0.1] * 9},
+        {"camera": {"k1": -0.1, "k4": 0.1}},
+    ],
+)
+def test_distortion_that_is_no_opencv_five_is_refused(tmp_path: Path, named: dict[str, Any]) -> None:
+    with pytest.raises(CalibrationError, match="distortion coefficients; 4 or 5 are needed"):
+        read(tmp_path, {**PLAIN, **named})
+
+
+def test_the_distance_of_a_camera_is_no_distortion(tmp_path: Path) -> None:
+    assert read(tmp_path, {**PLAIN, "camera_dist": 800.0}).stereo.camera.distortion == (0,) * 5
+
+
+@pytest.mark.parametrize(
+    ("stated", "unit_mm"),
+    [
+        ({"unit": "inch"}, 25.4),
+        ({"units": "cm"}, 10.0),
+        ({"camera": {"WorldUnits": "in"}, "projector": {"WorldUnits": "in"}}, 25.4),
+        ({"board": {"square_unit": "Metres."}}, 1000.0),
+        ({"units": "px", "unit": "mm", "sensor": {"unit": "um"}}, 1.0),
+        ({"pixel_unit": "um", "rotation_unit": "rad", "unit": ""}, 1.0),
+    ],
+)
+def test_lengths_are_in_the_unit_that_a_file_states(
+    tmp_path: Path, stated: dict[str, Any], unit_mm: float
+) -> None:
+    for given_mm in {1.0, unit_mm}:
+        found = read(tmp_path, {**PLAIN, "T": T / unit_mm, **stated}, given_mm)
+        np.testing.assert_allclose(found.stereo.pose.vector_mm, T)
+        assert f"its lengths are in units of {unit_mm:g} mm" in found.taken
+
+
+@pytest.mark.parametrize("stated", [{"unit": "furlong"}, {"unit": "mm", "T_unit": "m"}])
+def test_a_unit_that_is_none_or_two_is_refused(tmp_path: Path, stated: dict[str, Any]) -> None:
+    with pytest.raises(
+        CalibrationError, match=r"states the unit of its lengths by unit '.*and give --unit-mm"
+    ):
+        read(tmp_path, {**PLAIN, **stated})
+
+
+def test_a_unit_that_is_given_against_the_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CalibrationError, match="states unit 'cm', which is 10 mm, not 1000 mm as given"):
+        read(tmp_path, {**PLAIN, "unit": "cm"}, 1000.0)
