@@ -124,11 +124,17 @@ def _of_pair(numbers: Numbers, camera: str, projector: str) -> Parts:
 
 def _add_lens(found: Parts, numbers: Numbers, device: str, who: str, alone: str = "") -> None:
     """Matrix and distortion of a device that is called ``who``; ``alone`` adds names of its distortion."""
-    name = _named(numbers, f"{who}{_MATRIX}|{_MATRIX}{who}", {9, 4})
+    lengths = {name: values for name, values in numbers.items() if _are_lengths(values)}
+    words = f"{who}{_MATRIX}|{_MATRIX}{who}"
+    name = _named(numbers, words, {9}) or _named(lengths, words, {4})
     if name is not None:
         _add_matrix(found, f"{device} matrix", name, numbers[name].ravel())
-    matrix = found.names.get(f"{device} matrix")
-    _add_distortion(found, {n: v for n, v in numbers.items() if n != matrix}, device, who, alone)
+    _add_distortion(found, {n: v for n, v in numbers.items() if n not in lengths}, device, who, alone)
+
+
+def _are_lengths(values: NDArray[np.float64]) -> bool:
+    """Whether four numbers are fx, fy, cx, cy in px, not coefficients of the same name in another case."""
+    return values.size == 4 and bool((values > 1).all())
 
 
 def _add_distortion(found: Parts, numbers: Numbers, device: str, who: str, alone: str) -> None:

@@ -11,6 +11,8 @@ from dsl_core.io.published.stereo_names import Parts
 
 #: Distances of camera and projector, mm, outside of which the unit is doubted.
 USUAL_MM = (5.0, 20_000.0)
+#: Focal lengths outside of these multiples of the picture's side are doubted.
+USUAL_FOCAL = (0.2, 20.0)
 #: Parts of a distance below this share of it are not told.
 LEAST_SHARE = 0.005
 
@@ -44,6 +46,13 @@ def doubts(stereo: Stereo) -> Iterator[str]:
             "only columns of the projector were seen: its rows (fy, cy and ty) are assumed, so depth holds,"
             " but spectra through a film do not; calibrate with rows before you measure these"
         )
+    for device, lens in (("camera", stereo.camera), ("projector", stereo.projector)):
+        shares = lens.fx_px / lens.width_px, lens.fy_px / lens.height_px
+        if min(shares) < USUAL_FOCAL[0] or max(shares) > USUAL_FOCAL[1]:
+            yield (
+                f"the {device}'s focal lengths ({lens.fx_px:.3g}, {lens.fy_px:.3g} px) are not those of"
+                f" {lens.width_px} x {lens.height_px} px; check that its matrix is in px, and its size"
+            )
     lens = stereo.camera
     if not (0 < lens.cx_px < lens.width_px and 0 < lens.cy_px < lens.height_px):
         yield (

@@ -97,3 +97,27 @@ def test_a_unit_that_is_none_or_two_is_refused(tmp_path: Path, stated: dict[str,
 def test_a_unit_that_is_given_against_the_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match="states unit 'cm', which is 10 mm, not 1000 mm as given"):
         read(tmp_path, {**PLAIN, "unit": "cm"}, 1000.0)
+
+
+@pytest.mark.parametrize("k1", [0.12, -0.12])
+def test_four_coefficients_are_no_matrix_of_the_same_name(tmp_path: Path, k1: float) -> None:
+    found = read(tmp_path, {"cam_k": [k1, 0.02, 0.001, 0.002], **PLAIN})
+    assert found.names["camera matrix"] == "cam_K"
+    assert found.stereo.camera.distortion == (k1, 0.02, 0.001, 0.002, 0)
+    intrinsics = {"cam_k": [k1, 0.02, 0.001, 0.002], **PLAIN, "cam_K": None}
+    found = read(tmp_path, {**intrinsics, "cam_intrinsics": [1200, 1210, 640, 512]})
+    assert (found.stereo.camera.fx_px, found.stereo.camera.distortion[0]) == (1200, k1)
+    assert read(tmp_path, {"cam_k": [1200, 1210, 640, 512], **PLAIN}).stereo.camera.distortion == (0,) * 5
+
+
+@pytest.mark.parametrize(
+    ("scale", "device"), [(1 / 1280, "camera"), (0.1, "camera"), (30, "projector"), (0.5, ""), (10, "")]
+)
+def test_focal_lengths_that_are_not_those_of_the_picture_are_doubted(
+    tmp_path: Path, scale: float, device: str
+) -> None:
+    name = "proj_K" if device == "projector" else "cam_K"
+    lens = np.array(PLAIN[name]) * [[scale, 1, 1], [1, scale, 1], [1, 1, 1]]
+    doubts = read(tmp_path, {**PLAIN, name: lens}).doubts
+    assert [each.split("'")[0] for each in doubts] == [f"the {device}"] * bool(device)
+    assert all("check that its matrix is in px" in each for each in doubts)
