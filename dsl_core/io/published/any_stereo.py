@@ -83,6 +83,11 @@ def load_any_stereo(
             f"{path} lacks {' and '.join(lacking)}; it has {has}{odd}. Name them like cam_K, proj_K, R and T"
             " (3 x 3, 3 x 3, 3 x 3 and 3 numbers), from camera to projector."
         )
+    if parts.rivals is not None:
+        raise CalibrationError(
+            f"{path} has two values of one part that differ, {' and '.join(parts.rivals)}. Leave only the one"
+            " that is meant in the file, and remove or rename the other."
+        )
     if parts.both_placed is not None:
         of_camera, of_projector = parts.both_placed
         raise CalibrationError(

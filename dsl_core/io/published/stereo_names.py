@@ -28,11 +28,19 @@ _TO_PROJECTOR = r"(?:cam|camera|c)(?:2|to)(?:proj|projector|p)"
 _TO_CAMERA = r"(?:proj|projector|p)(?:2|to)(?:cam|camera|c)"
 _TURN = r"(?:r|rot|rotation|roration|rmat|rvec|rotationmatrix|rotationvector|om|rp|rotationofcamera2)"
 _SHIFT = r"(?:t|trans|translation|tvec|tmat|translationvector|tp|translationofcamera2)"
-_BOTH = r"(?:tcncnm1|cam1tcncnm1|transform(?:ation)?(?:matrix)?|extrinsics?(?:matrix)?|rt|pose|posecamera2a)"
+_BOTH = (
+    r"(?:tcncnm1|cam1tcncnm1|transform(?:ation)?(?:matrix)?|extrinsics?(?:matrix)?|rt|pose|posecamera2[at])"
+)
 #: Sizes with such names are counted in squares or corners.
 _OF_TARGET = re.compile(r"(?i)board|pattern|target|grid|corner|square")
 #: Names that are neither of a matrix nor of a distance.
 _SURE = r"(?:camera)?(?:distortion|dist(?:ortion)?coeff?(?:icient)?s?|kc)"
+#: Whatever has such names is no result, if there is the same without.
+_ASIDE = re.compile(
+    rf"{_OF_TARGET.pattern}|chess|std|sigma|deviation|error|uncertain|covarian|initial|rectif|[rt]vec"
+)
+#: Values of one part that differ by less than this share of the largest are the same, rounded.
+_ROUNDED = 1e-3
 #: Names of what says the unit of lengths, and what says that of something else.
 _UNIT = r"(?:world|length|distance|translation|baseline|board|square|target|pattern|size|pose|t)?units?"
 _OTHER_UNIT = re.compile(
@@ -55,7 +63,8 @@ class Parts:
 
     Matrices are (3, 3), distortions flat, ``turn`` (3, 3) or (3,), ``shift`` (3,). ``is_inverse`` says that a
     name tells the pose to lead from the projector to the camera. ``both_placed`` names the poses of camera
-    and projector where a file has one of each, so that neither leads from one device to the other.
+    and projector where a file has one of each, so that neither leads from one device to the other. ``rivals``
+    are two names of one part that have different values.
     """
 
     values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
@@ -63,6 +72,18 @@ class Parts:
     taken: list[str] = field(default_factory=list)
     is_inverse: bool = False
     both_placed: tuple[str, str] | None = None
+    rivals: tuple[str, str] | None = None
+
+    def find(self, numbers: Numbers, words: str, sizes: set[int]) -> str | None:
+        """The name of a part that is one of these words, no side result and the least nested."""
+        names = _all_named(numbers, words, sizes)
+        names = [name for name in names if not _ASIDE.search(name)] or names
+        least = min((name.count(".") for name in names), default=0)
+        names = [name for name in names if name.count(".") == least]
+        for other in names[1:]:
+            if not _are_same(numbers[names[0]], numbers[other]):
+                self.rivals = self.rivals or (names[0], other)
+        return names[0] if names else None
 
     def add(self, part: str, name: str, values: NDArray[np.float64]) -> None:
         """Note a part and its name."""
@@ -126,7 +147,7 @@ def _add_lens(found: Parts, numbers: Numbers, device: str, who: str, alone: str 
     """Matrix and distortion of a device that is called ``who``; ``alone`` adds names of its distortion."""
     lengths = {name: values for name, values in numbers.items() if _are_lengths(values)}
     words = f"{who}{_MATRIX}|{_MATRIX}{who}"
-    name = _named(numbers, words, {9}) or _named(lengths, words, {4})
+    name = found.find(numbers, words, {9}) or found.find(lengths, words, {4})
     if name is not None:
         _add_matrix(found, f"{device} matrix", name, numbers[name].ravel())
     _add_distortion(found, {n: v for n, v in numbers.items() if n not in lengths}, device, who, alone)
@@ -141,19 +162,19 @@ def _add_distortion(found: Parts, numbers: Numbers, device: str, who: str, alone
     """Coefficients in OpenCV's order, as many as there are; up to three are radial, with tangential ones."""
     part, words = f"{device} distortion", f"{who}{_DISTORTION}|{_DISTORTION}{who}{alone}"
     name = (
-        _named(numbers, f"{who}radialdistortion", {1, 2, 3})
-        or _named(numbers, words, _COEFFICIENTS)
-        or _named(numbers, f"{who}{_SURE}|{_SURE}{who}{alone}", {1, 9})
+        found.find(numbers, f"{who}radialdistortion", {1, 2, 3})
+        or found.find(numbers, words, _COEFFICIENTS)
+        or found.find(numbers, f"{who}{_SURE}|{_SURE}{who}{alone}", {1, 9})
     )
     if name is None:
-        terms = [_named(numbers, f"{who}(?:{_DISTORTION})?{term}", {1}) for term in _TERMS]
+        terms = [found.find(numbers, f"{who}(?:{_DISTORTION})?{term}", {1}) for term in _TERMS]
         named = ", ".join(each for each in terms if each)
         if named:
             found.add(part, named, np.array([numbers[each].item() if each else 0.0 for each in terms]))
         return
     values = numbers[name].ravel()
     if values.size < 4:
-        tangential = _named(numbers, f"{who}tangentialdistortion", {2})
+        tangential = found.find(numbers, f"{who}tangentialdistortion", {2})
         if tangential is None:
             found.taken.append(f"{name} is without tangential distortion")
         k, p = (
@@ -170,22 +191,29 @@ def _add_matrix(found: Parts, part: str, name: str, values: NDArray[np.float64])
         found.add(part, name, np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
         found.taken.append(f"{name} is fx, fy, cx, cy")
         return
-    matrix = values.reshape(3, 3)
-    # MATLAB multiplies rows from the left (not in the ``K`` of later versions), and counts pixels from 1.
-    transposed = not matrix[:2, 2].any() and bool(matrix[2, :2].any())
+    matrix = _upright(values)
+    # MATLAB counts pixels from 1.
+    transposed = not np.array_equal(matrix, values.reshape(3, 3))
     if transposed or "cameraparameters" in _plain(name):
-        matrix = (matrix.T if transposed else matrix) - np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
+        matrix = matrix - np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
         how = "transposed, with pixels from 1" if transposed else "with pixels from 1"
         found.taken.append(f"{name} is written as in MATLAB: {how}")
     found.add(part, name, matrix)
 
 
+def _upright(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A matrix (3, 3) of a lens as it multiplies columns; MATLAB's multiplies rows, but for a later ``K``."""
+    matrix = values.reshape(3, 3)
+    return matrix.T if not matrix[:2, 2].any() and matrix[2, :2].any() else matrix
+
+
 def _add_pose(found: Parts, numbers: Numbers) -> None:
-    for part, words, sizes in (("rotation", _TURN, {9, 3}), ("translation", _SHIFT, {3})):
+    for part, words, size in (("rotation", _TURN, 9), ("rotation", _TURN, 3), ("translation", _SHIFT, 3)):
         ways = f"{_OF_POSE}{words}|{words}{_TO_PROJECTOR}|{_TO_PROJECTOR}{words}"
         back = f"{words}{_TO_CAMERA}|{_TO_CAMERA}{words}"
-        for name, is_inverse in ((_named(numbers, ways, sizes), False), (_named(numbers, back, sizes), True)):
-            if name is not None and part not in found.values:
+        for each, is_inverse in ((ways, False), (back, True)):
+            name = None if part in found.values else found.find(numbers, each, {size})
+            if name is not None:
                 values = numbers[name]
                 values = values.reshape(3, 3) if values.size == 9 else values.ravel()
                 # MATLAB multiplies rows from the left.
@@ -196,12 +224,24 @@ def _add_pose(found: Parts, numbers: Numbers) -> None:
         return
     ways = f"(?:projector|proj|stereo)?{_BOTH}|t?{_TO_PROJECTOR}"
     for words, is_inverse in ((ways, False), (f"t?{_TO_CAMERA}", True)):
-        name = _named(numbers, words, {12, 16})
+        name = found.find(numbers, words, {12, 16})
         if name is not None and "rotation" not in found.values:
-            matrix = numbers[name].reshape(-1, 4)
+            values = numbers[name]
+            matrix = values if values.shape == (4, 3) else values.reshape(-1, 4)
+            if _is_of_rows(matrix):
+                matrix = matrix.T
+                found.taken.append(f"{name} is written for rows, as in MATLAB and DirectX: transposed")
             found.add("rotation", name, matrix[:3, :3])
             found.add("translation", name, matrix[:3, 3])
             found.is_inverse |= is_inverse
+
+
+def _is_of_rows(pose: NDArray[np.float64]) -> bool:
+    """Whether a pose multiplies rows from the right, so that its translation is in the last row."""
+    last = [0, 0, 0, 1]
+    if pose.shape == (4, 4):
+        return np.array_equal(pose[:, 3], last) and not np.array_equal(pose[3], last)
+    return pose.shape == (4, 3)
 
 
 def _both_placed(found: Parts, numbers: Numbers) -> tuple[str, str] | None:
@@ -227,11 +267,24 @@ def _is_nearly(values: NDArray[np.float64], still: NDArray[np.float64]) -> bool:
 
 
 def _named(numbers: Numbers, words: str, sizes: set[int]) -> str | None:
-    """The first name that is one of these words and has one of these sizes, with all that it is nested in."""
-    for name in numbers:
-        if numbers[name].size in sizes and any(re.fullmatch(words, each) for each in _endings(name)):
-            return name
-    return None
+    return next(iter(_all_named(numbers, words, sizes)), None)
+
+
+def _all_named(numbers: Numbers, words: str, sizes: set[int]) -> list[str]:
+    """The names that are one of these words and have one of these sizes, with all that they are nested in."""
+    return [
+        name
+        for name, values in numbers.items()
+        if values.size in sizes and any(re.fullmatch(words, each) for each in _endings(name))
+    ]
+
+
+def _are_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether two values of a part agree, one of them perhaps shorter or a transposed matrix of a lens."""
+    flat = [(_upright(each) if each.size == 9 else each).ravel() for each in (one, other)]
+    longest = max(each.size for each in flat)
+    first, second = (np.pad(each, (0, longest - each.size)) for each in flat)
+    return np.allclose(first, second, rtol=0, atol=_ROUNDED * float(np.abs(first).max()))
 
 
 def _endings(name: str) -> Iterator[str]:

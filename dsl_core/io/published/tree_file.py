@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -91,7 +91,8 @@ def _parsed(text: str) -> Mapping[str, Any]:
         except ElementTree.ParseError as error:
             raise ValueError(str(error)) from error
     elif text.lstrip("\ufeff \t\r\n")[:1] == "{":
-        tree = json.loads(_ODD.sub(lambda found: _JSON[found[0]], text.lstrip("\ufeff")))
+        sound = _ODD.sub(lambda found: _JSON[found[0]], text.lstrip("\ufeff"))
+        tree = json.loads(sound, object_pairs_hook=_by_name)
     else:
         tree = _of_yaml(text)
     if not isinstance(tree, Mapping):
@@ -105,9 +106,16 @@ def _of_yaml(text: str) -> Any:
     if _REFERENCE.search(text):
         raise ValueError("it refers to parts of itself")
     # Without types: OpenCV's tags are unknown to YAML, and its numbers are not all YAML's.
-    loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+    base: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+
+    class Loader(base):  # type: ignore[misc]
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict[str, Any]:
+            return _by_name(
+                [tuple(self.construct_object(each, deep=True) for each in two) for two in node.value]
+            )
+
     try:
-        return yaml.load(_HEADER.sub("", text), Loader=loader)
+        return yaml.load(_HEADER.sub("", text), Loader=Loader)
     except (yaml.YAMLError, TypeError) as error:
         raise ValueError(str(error)) from error
 
@@ -119,7 +127,15 @@ def _of_element(element: ElementTree.Element) -> Any:
         return (element.text or "").split()
     if all(child.tag == "_" for child in children):
         return [_of_element(child) for child in children]
-    return {child.tag: _of_element(child) for child in children}
+    return _by_name([(child.tag, _of_element(child)) for child in children])
+
+
+def _by_name(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Values by name; those of a name that is there more than once are a list, of which none is preferred."""
+    found: dict[str, list[Any]] = {}
+    for name, value in pairs:
+        found.setdefault(name, []).append(value)
+    return {name: values[0] if len(values) == 1 else values for name, values in found.items()}
 
 
 def _collect(value: Any, name: str, into: dict[str, Any], level: int) -> None:

@@ -121,3 +121,62 @@ def test_focal_lengths_that_are_not_those_of_the_picture_are_doubted(
     doubts = read(tmp_path, {**PLAIN, name: lens}).doubts
     assert [each.split("'")[0] for each in doubts] == [f"the {device}"] * bool(device)
     assert all("check that its matrix is in px" in each for each in doubts)
+
+
+OTHER_K, OTHER_R, OTHER_T = [[800.0, 0, 640], [0, 800, 512], [0, 0, 1]], np.eye(3), [-204.0, 0, 0]
+OTHER = {"cam_K": OTHER_K, "cam_kc": [0.01] * 5, "R": OTHER_R, "T": OTHER_T}
+VECTORS = {"rvec": [3.0, 0.1, 0.2], "tvec": [1.0, 2, 900]}
+
+
+@pytest.mark.parametrize("is_first", [False, True])
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"initial": OTHER},
+        {"uncertainty": OTHER},
+        {"Rectified": OTHER},
+        {"run_1": OTHER},
+        {"board": {"R": OTHER_R, "t": OTHER_T}},
+        VECTORS,
+    ],
+)
+def test_side_results_and_what_is_nested_do_not_count(
+    tmp_path: Path, other: dict[str, Any], is_first: bool
+) -> None:
+    own = {**PLAIN, "cam_kc": [0.0] * 5}
+    found = read(tmp_path, {**other, **own} if is_first else {**own, **other})
+    np.testing.assert_allclose(found.stereo.camera.matrix, K)
+    np.testing.assert_allclose(found.stereo.pose.matrix, R, atol=1e-7)
+    np.testing.assert_allclose(found.stereo.pose.vector_mm, T)
+    assert found.stereo.camera.distortion == (0,) * 5
+
+
+def test_all_parts_are_of_the_same_result(tmp_path: Path) -> None:
+    found = read(tmp_path, {"initial": OTHER, "final": {**PLAIN, "cam_kc": [0.1, 0, 0, 0, 0]}})
+    assert {name.split(".")[0] for name in found.names.values()} == {"final"}
+
+
+def test_of_two_results_none_is_chosen(tmp_path: Path) -> None:
+    same = {"camera": {"K": K, "intrinsicMatrix": np.transpose(K).tolist(), "kc": [0.1] * 5, "d": [0.1] * 5}}
+    assert read(tmp_path, {**PLAIN, "cam_K": None, **same}).stereo.camera.fx_px == 1200
+    with pytest.raises(CalibrationError, match=r"two values of one part that differ, a\.cam_K and b\.cam_K"):
+        read(tmp_path, {"a": PLAIN, "b": OTHER})
+    with pytest.raises(CalibrationError, match="differ, T and translation"):
+        read(tmp_path, {**PLAIN, "translation": T * 1.01})
+
+
+@pytest.mark.parametrize("is_flat", [False, True])
+@pytest.mark.parametrize("name", ["RT", "PoseCamera2.T"])
+def test_a_pose_may_have_its_translation_in_the_last_row(tmp_path: Path, name: str, is_flat: bool) -> None:
+    pose = np.vstack([np.c_[R, T], [0, 0, 0, 1]])
+    written = "RT is written for rows, as in MATLAB and DirectX: transposed".replace("RT", name)
+    for matrix, is_said in ((pose, False), (pose.T, True), (pose[:3], False), (pose.T[:, :3], True)):
+        if is_flat and matrix.size == 12:
+            continue
+        value: Any = matrix.ravel() if is_flat else matrix
+        for level in reversed(name.split(".")):
+            value = {level: value}
+        found = read(tmp_path, {**LENSES, **value})
+        np.testing.assert_allclose(found.stereo.pose.matrix, R, atol=1e-7)
+        np.testing.assert_allclose(found.stereo.pose.vector_mm, T)
+        assert (written in found.taken) == is_said

@@ -68,6 +68,18 @@ def test_what_a_file_says_in_words_has_a_name_too(tmp_path: Path, name: str, tex
 
 
 @pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("c.yml", "a: {b: 1}\na: {b: 2}\nc: 3\n"),
+        ("c.json", '{"a": {"b": 1}, "a": {"b": 2}, "c": 3}'),
+        ("c.xml", "<r><a><b>1</b></a><a><b>2</b></a><c>3</c></r>"),
+    ],
+)
+def test_of_two_with_one_name_none_is_taken(tmp_path: Path, name: str, text: str) -> None:
+    assert _read(tmp_path, name, text) == {"a": None, "c": 3.0}
+
+
+@pytest.mark.parametrize(
     "matrix",
     [
         "{rows: 2, cols: 2, data: [1, 2, 3]}",
