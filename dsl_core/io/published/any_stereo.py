@@ -18,7 +18,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.io.published.stereo import COLUMNS_ONLY, Size, Stereo, five_coefficients, lens_of
 from dsl_core.io.published.stereo_names import Numbers, Parts, parts_of, size_of, units_of
 from dsl_core.io.published.stereo_words import doubts, understood
-from dsl_core.io.published.tree_file import read_nodes, read_texts
+from dsl_core.io.published.tree_file import read_nodes, read_text, read_texts
 from dsl_core.model.base import problems_in_words
 from dsl_core.model.geometry import Pose
 
@@ -120,7 +120,7 @@ def load_any_stereo(
 
 
 def _require_pinhole(path: Path) -> None:
-    found = _OTHER_MODEL.search(path.read_text(encoding="utf-8", errors="replace"))
+    found = _OTHER_MODEL.search(read_text(path))
     if found is not None:
         model = re.sub(r"^\W+", "", found[0])
         raise CalibrationError(

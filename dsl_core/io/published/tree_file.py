@@ -29,8 +29,10 @@ _NESTING = re.compile(rb"</?[A-Za-z_][^<>]*(?<!/)>|[\[\]{}]")
 _HEADER = re.compile(r"\A\ufeff?%YAML[^\n]*\n")
 #: OpenCV writes these in JSON too, where they have other names.
 _ODD, _JSON = re.compile(r"(?<=[\s\[,:-])\.(?:Nan|Inf)\b"), {".Nan": "NaN", ".Inf": "Infinity"}
-#: A YAML file that repeats parts by reference can unfold to any size; no calibration does.
-_REFERENCE = re.compile(r"(?:^|[\s\[{,:-])[&*][\w-]")
+
+
+class _RepeatedError(ValueError):
+    """A YAML file repeats parts by reference, which can unfold to any size."""
 
 
 def read_nodes(path: Path) -> dict[str, Node]:
@@ -48,17 +50,33 @@ def read_texts(path: Path) -> dict[str, str]:
     return {name: value for name, value in values.items() if isinstance(value, str) and _node(value) is None}
 
 
-def _values(path: Path) -> dict[str, Any]:
-    """Whatever a file has by its name."""
+def read_text(path: Path) -> str:
+    """The text of a file in UTF-8 or UTF-16, otherwise in the code page of Windows in the west.
+
+    Raises `CalibrationError` for a file that is not there, cannot be read, or is too large.
+    """
     if not path.is_file():
         raise CalibrationError(f"{path} does not exist. Give the path of the calibration's XML or YAML file.")
     try:
         content = read_bounded(path, _MOST_BYTES)
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror or error}).") from error
-    _require_modest(content, path)
     try:
-        tree = _parsed(content.decode("utf-8"))
+        return content.decode(json.detect_encoding(content))
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
+
+def _values(path: Path) -> dict[str, Any]:
+    """Whatever a file has by its name."""
+    text = read_text(path)
+    _require_modest(text.encode(), path)
+    try:
+        tree = _parsed(text)
+    except _RepeatedError as error:
+        raise CalibrationError(
+            f"{path} repeats values by references such as *id001, which are not followed. Write them out."
+        ) from error
     except (ValueError, RecursionError) as error:
         raise CalibrationError(
             f"{path} is not a calibration that can be read: it is cut off or damaged, or it is not XML, YAML"
@@ -87,7 +105,7 @@ def _parsed(text: str) -> Mapping[str, Any]:
     """Names, lists and texts; raises ``ValueError`` for everything else."""
     if text.lstrip("\ufeff \t\r\n")[:1] == "<":
         try:
-            tree: Any = _of_element(ElementTree.fromstring(text.lstrip("\ufeff \t\r\n").encode()))
+            tree: Any = _of_element(ElementTree.fromstring(text.lstrip("\ufeff \t\r\n")))
         except ElementTree.ParseError as error:
             raise ValueError(str(error)) from error
     elif text.lstrip("\ufeff \t\r\n")[:1] == "{":
@@ -103,10 +121,9 @@ def _parsed(text: str) -> Mapping[str, Any]:
 def _of_yaml(text: str) -> Any:
     import yaml
 
-    if _REFERENCE.search(text):
-        raise ValueError("it refers to parts of itself")
     # Without types: OpenCV's tags are unknown to YAML, and its numbers are not all YAML's.
     base: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+    sound = _HEADER.sub("", text)
 
     class Loader(base):  # type: ignore[misc]
         def construct_mapping(self, node: Any, deep: bool = False) -> dict[str, Any]:
@@ -115,7 +132,9 @@ def _of_yaml(text: str) -> Any:
             )
 
     try:
-        return yaml.load(_HEADER.sub("", text), Loader=Loader)
+        if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(sound, Loader=base)):
+            raise _RepeatedError
+        return yaml.load(sound, Loader=Loader)
     except (yaml.YAMLError, TypeError) as error:
         raise ValueError(str(error)) from error
 

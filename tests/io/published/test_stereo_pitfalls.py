@@ -180,3 +180,9 @@ def test_a_pose_may_have_its_translation_in_the_last_row(tmp_path: Path, name: s
         np.testing.assert_allclose(found.stereo.pose.matrix, R, atol=1e-7)
         np.testing.assert_allclose(found.stereo.pose.vector_mm, T)
         assert (written in found.taken) == is_said
+
+
+def test_another_model_of_lenses_is_found_in_any_encoding(tmp_path: Path) -> None:
+    (tmp_path / "c.json").write_text(json.dumps({**PLAIN, "model": "fisheye"}), encoding="utf-16")
+    with pytest.raises(CalibrationError, match="describes a lens by the model 'fisheye'"):
+        load_any_stereo(tmp_path / "c.json")

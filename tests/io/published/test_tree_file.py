@@ -80,6 +80,34 @@ def test_of_two_with_one_name_none_is_taken(tmp_path: Path, name: str, text: str
 
 
 @pytest.mark.parametrize(
+    ("name", "text", "encoding"),
+    [
+        ("c.yml", "# -*- mode: yaml -*-\n# x_p = R *x_c + t\nby: Smith &Co, *all\na: &k [1, 2]\n", "utf-8"),
+        ("c.yml", "# Größe – in Pixeln\na: [1, 2]\n", "cp1252"),
+        ("c.yml", "by: Grüße\na: [1, 2]\n", "utf-16"),
+        ("c.json", '{"by": "Grüße", "a": [1, 2]}', "utf-16-le"),
+        ("c.json", '{"by": "Grüße", "a": [1, 2]}', "utf-8-sig"),
+        (
+            "c.xml",
+            '<?xml version="1.0" encoding="ISO-8859-1"?><r><by>Grüße</by><a>1 2</a></r>',
+            "latin-1",
+        ),
+        ("c.xml", '<?xml version="1.0" encoding="UTF-16"?><r><by>Grüße</by><a>1 2</a></r>', "utf-16"),
+    ],
+)
+def test_sound_files_are_read_whatever_their_notes(
+    tmp_path: Path, name: str, text: str, encoding: str
+) -> None:
+    (tmp_path / name).write_bytes(text.encode(encoding))
+    np.testing.assert_array_equal(read_nodes(tmp_path / name)["a"], [1, 2])
+
+
+def test_values_that_are_repeated_by_reference_are_named(tmp_path: Path) -> None:
+    with pytest.raises(CalibrationError, match=r"repeats values by references such as \*id001"):
+        _read(tmp_path, "c.yml", "a: &id001 [1, 2]\nb: *id001\n")
+
+
+@pytest.mark.parametrize(
     "matrix",
     [
         "{rows: 2, cols: 2, data: [1, 2, 3]}",
@@ -104,7 +132,6 @@ def test_what_is_not_a_whole_matrix_is_none(tmp_path: Path, matrix: str) -> None
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("c.yml", "a: &a [1, 2]\nb: *a\n"),
         ("c.yml", "a: [1, 2\n"),
         ("c.yml", "a: b: c: d\n"),
         ("c.yml", "- 1\n- 2\n"),
