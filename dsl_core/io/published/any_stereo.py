@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.published.stereo import COLUMNS_ONLY, Size, Stereo, five_coefficients, lens_of
+from dsl_core.io.published.stereo import (
+    COLUMNS_ONLY,
+    Size,
+    Stereo,
+    five_coefficients,
+    lens_of,
+    require_lens_matrix,
+)
 from dsl_core.io.published.stereo_names import Numbers, Parts, parts_of, size_of, units_of
 from dsl_core.io.published.stereo_words import doubts, understood
 from dsl_core.io.published.tree_file import read_nodes, read_text, read_texts
@@ -28,8 +35,6 @@ _PARTS = (
 )  # fmt: skip
 #: A rotation vector that is longer is none in radians.
 _MOST_TURN_RAD = 6.3
-#: Skew of a lens, relative to its focal length, that passes for none.
-_MOST_SKEW = 1e-3
 _CORRECT = {
     "camera": "Correct --camera-size, or calibrate with that size.",
     "projector": "Correct --projector, or calibrate with that size.",
@@ -95,11 +100,13 @@ def load_any_stereo(
             " that neither leads from one to the other. Give one R and T from camera to projector instead:"
             " for poses x = R X + t of points X of the world, R = Rp Rc^T and T = tp - R tc."
         )
+    for part in ("camera matrix", "projector matrix"):
+        require_lens_matrix(parts.values[part], parts.names[part], path)
     unit_mm = _unit_mm(path, unit_mm)
     given = {"camera": camera_size_px, "projector": projector_size_px}
     try:
         camera, projector = (
-            lens_of(_matrix(parts, who, path), _distortion(parts, who, path), size)
+            lens_of(parts.values[f"{who} matrix"], _distortion(parts, who, path), size)
             for who, size in [(who, _size(path, numbers, who, size)) for who, size in given.items()]
         )
         turn, shift = _rotation(parts, path), parts.values["translation"] * unit_mm
@@ -160,18 +167,6 @@ def _size(path: Path, numbers: Numbers, device: str, given: Size | None) -> Size
             f" {_CORRECT[device]}"
         )
     return size
-
-
-def _matrix(parts: Parts, who: str, path: Path) -> NDArray[np.float64]:
-    """A matrix of focal lengths and a principal point and nothing else; raises `CalibrationError`."""
-    name, matrix = parts.names[f"{who} matrix"], parts.values[f"{who} matrix"]
-    skew = matrix[0, 1]
-    if matrix[1, 0] or matrix[2, :2].any() or matrix[2, 2] != 1 or abs(skew) > _MOST_SKEW * abs(matrix[0, 0]):
-        raise CalibrationError(
-            f"{path}: {name} is not a matrix of fx, fy, cx, cy with 0 0 1 in its last row and no skew."
-            " Calibrate without skew, or correct it."
-        )
-    return matrix
 
 
 def _distortion(parts: Parts, who: str, path: Path) -> NDArray[np.float64]:

@@ -25,6 +25,8 @@ from dsl_core.model.geometry import Lens, Pose
 
 #: Node of a calibration from columns alone.
 COLUMNS_ONLY = "columns_only"
+#: Skew of a lens, relative to its focal length, that passes for none.
+_MOST_SKEW = 1e-3
 Dialect = Literal["dsl", "procam", "moreno-taubin"]
 Size = tuple[int, int]
 
@@ -193,7 +195,19 @@ def _shaped(nodes: dict[str, Node], node: str, part: str, path: Path) -> NDArray
         raise CalibrationError(f"{path}: {node} contains numbers that are not finite. Calibrate again.")
     if shape is None:
         return five_coefficients(values.ravel(), node, path)
+    if part.endswith("matrix"):
+        require_lens_matrix(values, node, path)
     return values
+
+
+def require_lens_matrix(matrix: NDArray[np.float64], node: str, path: Path) -> None:
+    """Raise `CalibrationError` for a matrix (3, 3) of more than focal lengths and a principal point."""
+    skew = matrix[0, 1]
+    if matrix[1, 0] or matrix[2, :2].any() or matrix[2, 2] != 1 or abs(skew) > _MOST_SKEW * abs(matrix[0, 0]):
+        raise CalibrationError(
+            f"{path}: {node} is not a matrix of fx, fy, cx, cy with 0 0 1 in its last row and no skew."
+            " Calibrate without skew, or correct it."
+        )
 
 
 def five_coefficients(values: NDArray[np.float64], node: str, path: Path) -> NDArray[np.float64]:

@@ -125,7 +125,14 @@ def test_files_that_are_no_calibration(tmp_path: Path, content: str) -> None:
         ("T", np.zeros(2), r"T has shape \(2,\), \(3,\) is needed for the translation"),
         ("R", 2 * np.eye(3), "pose.*orthonormal"),
         ("R", np.diag([1.0, 1.0, -1.0]), "pose.*right-handed"),
-        ("cam_K", -np.eye(3), "fx_px must be greater than 0"),
+        ("cam_K", np.diag([-1.0, -1.0, 1.0]), "fx_px must be greater than 0"),
+        (
+            "cam_K",
+            small_rig().camera.matrix + np.diag([60.0, 0], 1),
+            "cam_K is not a matrix of fx, fy, cx, cy",
+        ),
+        ("proj_K", 2 * small_rig().projector.matrix, "proj_K is not a matrix of fx, fy, cx, cy"),
+        ("cam_K", small_rig().camera.matrix.T, "cam_K is not a matrix of fx, fy, cx, cy"),
     ],
 )
 def test_wrong_values_are_refused(tmp_path: Path, node: str, value: NDArray[np.float64], says: str) -> None:
