@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from pathlib import PurePosixPath
 from typing import Any
 
 from dsl_core.errors import StoreError
@@ -44,15 +45,17 @@ class ObjectFolder:
             )
 
     def listed(self) -> dict[str, Found]:
-        """All objects by their names."""
+        """All objects by their names, but for empty ones that other programs make in place of folders."""
         import obstore
 
         with self._told("cannot be read"):
-            return {
+            found = {
                 meta["path"]: Found(meta["size"], str(meta["e_tag"]), meta["last_modified"])
                 for batch in obstore.list(self._store)
                 for meta in batch
             }
+        folders = {"", *(str(folder) for name in found for folder in PurePosixPath(name).parents)}
+        return {name: each for name, each in found.items() if each.size or name not in folders}
 
     def get(self, name: str) -> bytes | None:
         """An object; None where there is none."""

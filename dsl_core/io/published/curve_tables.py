@@ -110,7 +110,9 @@ def _load(folder: Path, name: str) -> list[SpectralCurve]:
         )
     bands = rows.shape[1]
     if not rows.any(axis=1).all():
-        raise CalibrationError(f"{path}: a {name} is zero throughout. Measure it again.")
+        raise CalibrationError(
+            f"{path}: the {name} of a colour or an order is zero throughout. Measure it again."
+        )
     if name == "efficiency" and rows.max() > MOST_EFFICIENCY:
         raise CalibrationError(
             f"{path} holds up to {rows.max():.3g}; an efficiency is a share of the light, not more than 1."

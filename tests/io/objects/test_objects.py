@@ -64,6 +64,19 @@ def test_a_result_is_the_same_after_a_round_trip(twin: ObjectStoreTwin, result: 
     assert not list(rooms.room_of(RESULT).parent.glob("*"))
 
 
+def test_empty_objects_in_place_of_folders_are_no_files(
+    twin: ObjectStoreTwin, result: Path, tmp_path: Path
+) -> None:
+    """Consoles and mounted stores make them; a name that only such an object has is free."""
+    twin.put("2026/a.zarr/", b"")
+    publish(result, ObjectFolder(RESULT))
+    for folder in ("", "rgb/", "rgb/c/"):
+        twin.put(f"2026/a.zarr/{folder}", b"")
+    fetch(ObjectFolder(RESULT), tmp_path / "copy")
+    back = load_result(tmp_path / "copy", lazy=False)
+    np.testing.assert_array_equal(back["rgb"].values, load_result(result)["rgb"].values)
+
+
 def test_what_is_here_is_not_brought_again(twin: ObjectStoreTwin, result: Path, tmp_path: Path) -> None:
     publish(result, ObjectFolder(RESULT))
     for _ in range(2):
