@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from glob import escape
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import picture_files
@@ -197,3 +200,18 @@ def _name(folder: Path, group: Sequence[Path]) -> str:
     if len(parents) == 1 and group[0].parent != folder:
         return group[0].relative_to(folder).parent.as_posix()
     return _LAST_NUMBER.sub("", group[0].stem).strip(" _-.") or group[0].stem
+
+
+def require_alike(picture: Picture, values: NDArray[Any], first: NDArray[Any]) -> None:
+    """Raise `StoreError` unless the values of a picture have size and kind of those of the first one."""
+    if values.shape[:2] != first.shape[:2]:
+        raise StoreError(
+            f"{picture} is {values.shape[1]} x {values.shape[0]} px, the first picture {first.shape[1]} x"
+            f" {first.shape[0]} px. Keep pictures of one camera and size in a folder, or state a mapping."
+        )
+    if (values.dtype.kind, values.dtype.itemsize) != (first.dtype.kind, first.dtype.itemsize):
+        raise StoreError(
+            f"{picture} has values of {8 * values.dtype.itemsize} bits ({values.dtype}), the first picture of"
+            f" {8 * first.dtype.itemsize} ({first.dtype}), whose white is another. Save all pictures of a"
+            " capture alike."
+        )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import arrange
 from dsl_core.io.pictures.camera_raw import BITS
-from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of
+from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of, require_alike
 from dsl_core.io.pictures.encoding import guessed_encoding
 from dsl_core.io.pictures.float_scale import FloatScale
 from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of, untold_width
@@ -251,19 +252,16 @@ def _alike_next(order: Sequence[Candidate], number: int, whole: Sequence[Candida
 
 def _look_at(candidate: Candidate) -> _Look:
     taker, bits, most, fractions = ProbeTaker(), 0, 0.0, FloatScale()
-    shape: tuple[int, ...] | None = None
+    first: NDArray[Any] | None = None
     brightest: tuple[float, NDArray[np.float32]] | None = None
     colour = is_wide = False
     for picture in candidate.pictures:
         if picture is None:
             continue
         values = load_values(picture)
-        if shape is not None and values.shape[:2] != shape[:2]:
-            raise StoreError(
-                f"{picture} is {values.shape[1]} x {values.shape[0]} px, the first picture {shape[1]} x"
-                f" {shape[0]} px. Keep pictures of one camera and size in a folder, or state a mapping."
-            )
-        shape, colour = values.shape, colour or values.ndim == 3
+        first = values if first is None else first
+        require_alike(picture, values, first)
+        colour = colour or values.ndim == 3
         most = max(most, float(values.max()))
         if values.dtype.kind == "f":
             fractions.add(values)

@@ -8,19 +8,23 @@ from dataclasses import dataclass
 
 _PFM = re.compile(rb"P[Ff]\s+(\d{1,9})\s+(\d{1,9})\s")
 #: Tags of TIFF (revision 6.0), and how many bytes a number of a kind has.
-_WIDTH, _HEIGHT, _BITS, _SAMPLES, _PLANES = 256, 257, 258, 277, 284
+_WIDTH, _HEIGHT, _BITS, _LIGHT, _SAMPLES, _PLANES = 256, 257, 258, 262, 277, 284
 _FORMS = {1: "B", 3: "H", 4: "I", 16: "Q"}
-_APART = 2
+_APART, _WHITE_IS_ZERO = 2, 0
 
 
 @dataclass(frozen=True)
 class Head:
-    """One picture of a file; ``is_apart``: the planes of its colours follow each other."""
+    """One picture of a file.
+
+    ``is_apart``: the planes of its colours follow each other; ``is_negative``: its smallest value is white.
+    """
 
     width_px: int
     height_px: int
     bits: int
     is_apart: bool = False
+    is_negative: bool = False
 
 
 def heads_of(data: bytes, most: int) -> list[Head]:
@@ -49,10 +53,12 @@ def _pages(data: bytes, order: str, is_big: bool, most: int) -> list[Head]:
         tags = {}
         for entry in range(first, first + entries * length, length):
             tag, kind, many = struct.unpack_from(f"{order}HH{place}", data, entry)
-            if tag in (_WIDTH, _HEIGHT, _BITS, _SAMPLES, _PLANES) and kind in _FORMS:
+            if tag in (_WIDTH, _HEIGHT, _BITS, _LIGHT, _SAMPLES, _PLANES) and kind in _FORMS:
                 tags[tag] = _number(data, order + _FORMS[kind], many, entry + 4 + size, order + place)
         is_apart = tags.get(_PLANES) == _APART and tags.get(_SAMPLES, 1) > 1
-        found.append(Head(tags.get(_WIDTH, 0), tags.get(_HEIGHT, 0), tags.get(_BITS, 1), is_apart))
+        is_negative = tags.get(_LIGHT) == _WHITE_IS_ZERO
+        size_px = tags.get(_WIDTH, 0), tags.get(_HEIGHT, 0)
+        found.append(Head(*size_px, tags.get(_BITS, 1), is_apart, is_negative))
         (at,) = struct.unpack_from(order + place, data, first + entries * length)
     return found
 

@@ -339,6 +339,9 @@ def _image(path: Path, index: int | None = None) -> NDArray[Any]:
         raise StoreError(f"{path} claims more pixels than a camera has. Leave it out.") from error
     if found is None:
         raise _damaged(path)
+    if heads and heads[-1].is_negative and found.dtype == np.uint16:
+        # OpenCV turns those of 8 bits into positives, but not these.
+        found = np.iinfo(np.uint16).max - found
     return np.asarray(found[..., 2::-1] if found.ndim == 3 and found.shape[2] >= 3 else found)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import OpenEXR
 import pytest
@@ -399,3 +400,10 @@ def test_one_of_two_exposures_that_end_names_is_taken(tmp_path: Path, gray: Pict
     guess = guess_mapping(write(tmp_path, named), PROJECTOR)
     assert guess.mapping.parts == (StripePictures(bits=7), WhitePicture(), BlackPicture())
     assert (guess.mapping.name, guess.others) == ("40ms", ("80ms",))
+
+
+def test_pictures_of_8_and_of_16_bits_are_no_capture_together(tmp_path: Path, gray: Pictures) -> None:
+    folder = write(tmp_path, {f"im{i + 1}.png": p for i, p in enumerate(gray)})
+    cv2.imwrite(str(folder / "im3.png"), gray[2].astype(np.uint16) * 257)
+    with pytest.raises(StoreError, match=r"im3\.png has values of 16 bits .*, the first picture of 8 "):
+        guess_mapping(folder, PROJECTOR)

@@ -87,6 +87,16 @@ def test_separate_planes_are_read_right_or_refused(
             read(tmp_path / "c.tif", tiff(values, apart=True, order=order, big=big))
 
 
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_pictures_whose_zero_is_white_are_read_as_positives(tmp_path: Path, kind: type) -> None:
+    grey = (RGB[..., 0] >> (8 if kind is np.uint8 else 0)).astype(kind)
+    content = bytearray(tiff(np.iinfo(kind).max - grey))
+    at = struct.unpack_from("<I", content, 4)[0] + 2 + 4 * 12
+    assert struct.unpack_from("<HHII", content, at)[0] == 262
+    struct.pack_into("<HHII", content, at, 262, 3, 1, 0)
+    np.testing.assert_array_equal(read(tmp_path / "a.tif", bytes(content)), grey)
+
+
 def test_pfm_in_colour_and_tiff_of_64_bits_are_read(tmp_path: Path) -> None:
     colour = (RGB / 65535).astype(np.float32)
     pfm = b"PF\n8 6\n-1.0\n" + colour[::-1].astype("<f4").tobytes()
