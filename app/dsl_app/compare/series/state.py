@@ -35,7 +35,8 @@ NOTHING = {
 }
 
 
-@dataclass(frozen=True)
+# Targets are arrays, which have no single result of ``==``: a row equals itself alone.
+@dataclass(frozen=True, eq=False)
 class SeriesRow:
     """A result of the series; ``position_mm`` is None while the stage position is unknown.
 

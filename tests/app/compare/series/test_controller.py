@@ -233,6 +233,16 @@ def test_a_replaced_reference_is_read_again(series: SeriesController, tmp_path: 
     assert min(error for error in after if error is not None) > 2
 
 
+def test_undo_replaces_a_row_that_differs_only_in_its_arrays(
+    series: SeriesController, undo: UndoStack, stage: list[Path]
+) -> None:
+    series.add(stage[:1])
+    series.remove(stage[0])
+    series.add(stage[:1])
+    undo.undo()
+    assert [row.path for row in series.state.rows.value] == stage[:1]
+
+
 def test_a_region_is_read_again(series: SeriesController, undo: UndoStack, stage: list[Path]) -> None:
     series.add(stage)
     series.set_region((4, 4, 36, 28))
