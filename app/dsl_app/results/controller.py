@@ -117,6 +117,10 @@ class ResultsController:
 
         self._start(f"Reconstruct {session.name}", work)
 
+    def decline(self) -> None:
+        """Show what was open before a scan was offered."""
+        self.state.offer.set(None)
+
     def _load(self, path: Path) -> None:
         self._start(f"Open {path.name}", lambda progress: load_arrays(path, progress), is_minor=True)
 
@@ -218,9 +222,15 @@ class ResultsController:
                 by.set(chosen)
 
     def export(self) -> ExportController | None:
-        """What writes files of the open result as it is looked at now; None while it is on no disk."""
-        result = self.state.saved_result
+        """What writes files of the result as it is looked at now; None where no saved one is shown."""
+        result = self.shown_result()
         return result and ExportController(result, self.state, self._runner, self._notifier)
+
+    def shown_result(self) -> ResultArrays | None:
+        """The result that something is to be done with; says so where an offer hides it."""
+        if why := self.state.hidden:
+            self._notifier.tell("info", why)
+        return None if why else self.state.saved_result
 
     def command_line(self) -> str:
         """The command that reconstructs the offered scan or exports the open result."""
@@ -324,7 +334,9 @@ class ResultsController:
 
     def inspect(self) -> None:
         """Show what the pixel under the cursor received in each frame; needs the scan next to the result."""
-        result, pixel, block = self.state.saved_result, self.state.cursor.value, self._block
+        result, pixel, block = self.shown_result(), self.state.cursor.value, self._block
+        if self.state.hidden:
+            return
         if result is None or pixel is None:
             self._notifier.tell("info", "Point at a pixel to see its intensity graph.")
             return

@@ -165,6 +165,7 @@ class ResultsPage(PageWidget):
         self._report.clicked.connect(self.report)
         self._inspect.clicked.connect(control.inspect)
         self.offer.reconstruct.clicked.connect(control.reconstruct)
+        self.offer.later.clicked.connect(control.decline)
         for button in (self.reconstruct_again, self.offer.otherwise):
             button.clicked.connect(self.reconstruct_again_requested)
         follow_any(self._show_summary, state.result, state.offer, state.busy, state.is_begun)
@@ -184,7 +185,7 @@ class ResultsPage(PageWidget):
         self.stack.setCurrentIndex(summary.content)
         self.offer.show_offer(summary.message, summary.can_reconstruct)
         for button in (self.reconstruct_again, self._inspect, self._report, self._export):
-            allow(button, summary.has_result, "Open a result first.")
+            allow(button, summary.has_result, state.hidden or "Open a result first.")
         self.title.setText(short_name(summary.title))
         self.title.setToolTip(plain_tip(summary.title))
         self.about.setText(summary.about)
@@ -251,7 +252,7 @@ class ResultsPage(PageWidget):
     def report(self) -> None:
         """Ask for a file and write a report about what is marked."""
         # Another result may be opened while a person chooses.
-        result, materials = self._state.saved_result, self._state.materials.value
+        result, materials = self._control.shown_result(), self._state.materials.value
         if result is None:
             return
         draft = str(folder_for(result.path) / f"{result.path.stem}_report.html")

@@ -228,6 +228,13 @@ class ResultsState:
         return None if self.is_begun.value else self.result.value
 
     @property
+    def hidden(self) -> str:
+        """Why nothing is done with the open result; empty where it is shown, or none is open."""
+        if self.offer.value is None or self.saved_result is None:
+            return ""
+        return "A scan is offered in place of the result. Choose 'Not now' to return to the result."
+
+    @property
     def no_spectra(self) -> str:
         """Why the open result shows no spectra; empty where it has them, or none is open."""
         result = self.result.value

@@ -69,11 +69,13 @@ class Offer(QWidget):
         self.otherwise = push_button(
             "With other parameters…", "Choose bands, solver, calibration and name first (Ctrl+R)"
         )
+        self.later = push_button("Not now", "Show what was here before; the scan stays as it is")
+        self._buttons = (self.reconstruct, self.otherwise, self.later)
         column_of(
             STRETCH,
             self.message,
             8,
-            *((button, 0, Qt.AlignmentFlag.AlignHCenter) for button in (self.reconstruct, self.otherwise)),
+            *((button, 0, Qt.AlignmentFlag.AlignHCenter) for button in self._buttons),
             Stretch(2),
             on=self,
         )
@@ -81,5 +83,5 @@ class Offer(QWidget):
     def show_offer(self, message: str, can_reconstruct: bool) -> None:
         """Show a message; the buttons only where a scan can be reconstructed."""
         self.message.setText(message)
-        for button in (self.reconstruct, self.otherwise):
+        for button in self._buttons:
             button.setVisible(can_reconstruct)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from dsl_app.results.export.dialog import ExportDialog
 from dsl_app.results.state import ResultView
 from dsl_app.shared.theme import DARK as DARK_THEME
 from dsl_app.shared.theme import LIGHT
 from dsl_app.shared.widgets.deferred import Deferred
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QTabWidget
+from PySide6.QtWidgets import QApplication, QLabel, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from tests.app.support.results_bench import Bench
@@ -30,6 +31,24 @@ def test_without_a_result_a_sentence_says_what_to_do(qtbot: QtBot, tmp_path: Pat
     bench.state.offer.set(tmp_path / "scan.dsl")
     assert "scan.dsl has no result yet" in bench.page.offer.message.text()
     assert bench.page.offer.reconstruct.isVisible()
+
+
+def test_keys_do_nothing_with_a_result_that_an_offered_scan_hides(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((3, 5))
+    bench.control.point_at((3, 5))
+    QApplication.clipboard().setText("mine")
+    bench.state.offer.set(tmp_path / "scan.dsl")
+    for key in ("export", "intensity_graph", "copy_spectra", "export_spectra"):
+        bench.window.do(key)
+        said = bench.window.toasts.shown[-1].text
+        assert "Choose 'Not now' to return to the result" in said
+        bench.window.toasts.withdraw(said)
+    assert not bench.page.findChildren(ExportDialog)
+    assert QApplication.clipboard().text() == "mine"
+    QTest.mouseClick(bench.page.offer.later, Qt.MouseButton.LeftButton)
+    assert bench.page.image.isVisible()
+    bench.window.do("copy_spectra")
+    assert QApplication.clipboard().text() != "mine"
 
 
 def test_recent_files_are_offered_and_vanished_ones_marked(qtbot: QtBot, tmp_path: Path) -> None:

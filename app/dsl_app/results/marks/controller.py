@@ -208,9 +208,11 @@ class MarksController:
 
     def shown(self) -> list[NamedSpectrum]:
         """The spectra that can be copied or exported; if there are none, says what to do."""
-        found = shown_spectra(self.state.marks.value, self.state.result.value)
+        why = self.state.hidden
+        found = [] if why else shown_spectra(self.state.marks.value, self.state.result.value)
         if not found:
-            self._notifier.tell("info", "No spectrum is ticked. Pin a pixel, draw a region, or tick one.")
+            none_ticked = "No spectrum is ticked. Pin a pixel, draw a region, or tick one."
+            self._notifier.tell("info", why or none_ticked)
         return found
 
     def copy_spectra(self, put: Callable[[str], object]) -> None:
