@@ -123,15 +123,26 @@ class ReconstructAgainAction:
         dialog.open()
 
     def _show(self, done: Reconstructed) -> None:
-        window, replaces = self._window, self._window.page in REPLACED_PAGES
-        window.page_of("results").open_path(done.result)
+        from dsl_app.results.page import ResultsPage
+
+        window, page = self._window, self._window.page_of("results")
+        assert isinstance(page, ResultsPage)
+        replaces, opens = window.page in REPLACED_PAGES, not page.is_busy
         window.parts.recent.add(done.result)
         offers: dict[str, Callable[[], object]] = {}
-        if replaces:
+
+        def show() -> None:
+            window.open_page("results")
+            if not opens:
+                window.open_path(done.result)
+
+        if opens:
+            page.open_path(done.result)
+        if opens and replaces:
             window.open_page("results")
         else:
-            offers["Show result"] = lambda: window.open_page("results")
-        text = f"{done.result.name} is open on the Results page."
+            offers["Show result"] = show
+        text = f"{done.result.name} is {'open on the Results page' if opens else 'saved'}."
         if done.before is not None:
             before = done.before
             offers["Compare both"] = lambda: self._compare(before, done.result)

@@ -271,6 +271,11 @@ class ResultsPage(PageWidget):
         return self._control.open(path)
 
     @property
+    def is_busy(self) -> bool:
+        """Whether nothing can be opened now, as a result is being opened or made."""
+        return bool(self._state.busy.value)
+
+    @property
     def is_reading(self) -> bool:
         """Whether a result or its marks are still being read."""
         return self._control.is_reading

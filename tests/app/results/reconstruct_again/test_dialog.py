@@ -10,6 +10,7 @@ from dsl_app.compare.page import ComparePage
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.page import ResultsPage
 from dsl_app.results.reconstruct_again.dialog import ReconstructionDialog
+from dsl_app.results.reconstruct_again.state import Reconstructed
 from dsl_app.shared.widgets.open_dialog import OpenDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
@@ -31,8 +32,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def window(qtbot: QtBot, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MainWindow:
-    """A window with a result of a scan beside it."""
+def composed(qtbot: QtBot, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Composition:
+    """The application, with a result of a scan beside it open in its window."""
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
     # What is still read when the window closes is not asked about.
     monkeypatch.setattr("dsl_app.shell.paged_window.confirm", lambda *_, **__: True)
@@ -42,7 +43,12 @@ def window(qtbot: QtBot, finished: Path, tmp_path: Path, monkeypatch: pytest.Mon
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
     made.open_path(tmp_path / "small.zarr")
     qtbot.waitUntil(lambda: not made.parts.runner.active, timeout=PATIENCE_MS)
-    return made
+    return composition
+
+
+@pytest.fixture
+def window(composed: Composition) -> MainWindow:
+    return composed.window
 
 
 def opened(qtbot: QtBot, window: MainWindow) -> ReconstructionDialog:
@@ -131,6 +137,25 @@ def test_who_works_elsewhere_is_not_torn_away(qtbot: QtBot, window: MainWindow, 
     (show,) = [b for b in window.toasts.shown[-1].findChildren(QPushButton) if b.text() == "Show result"]
     show.click()
     assert window.page == "results"
+
+
+def test_a_result_is_not_said_to_be_open_where_the_page_was_busy(
+    qtbot: QtBot, composed: Composition, tmp_path: Path
+) -> None:
+    window = composed.window
+    page = results(window)
+    before = page.subject()
+    page._state.busy.set("Reconstruct other.dsl")
+    made = Path(shutil.copytree(tmp_path / "small.zarr", tmp_path / "second.zarr"))
+    composed.reconstruct_again.control.state.done.emit(Reconstructed(made, None))
+    qtbot.waitUntil(lambda: bool(window.toasts.shown), timeout=PATIENCE_MS)
+    (said,) = window.toasts.shown
+    assert said.text == "second.zarr is saved."
+    assert page.subject() == before
+    page._state.busy.set("")
+    (show,) = [each for each in said.findChildren(QPushButton) if each.text() == "Show result"]
+    show.click()
+    qtbot.waitUntil(lambda: page.subject() == made, timeout=PATIENCE_MS)
 
 
 def test_elsewhere_it_asks_for_the_scan(
