@@ -96,12 +96,14 @@ def spectra_as_text(spectra: Sequence[NamedSpectrum]) -> str:
 def _rows(spectra: Sequence[NamedSpectrum], missing: str) -> Iterator[list[str]]:
     head, columns = [WAVELENGTH], []
     for spectrum in spectra:
+        # As written, since the same wavelength of two spectra may differ by a rounding.
+        labels = [f"{nm:g}" for nm in spectrum.wavelengths_nm.tolist()]
         for title, values in _columns(spectrum):
             head.append(f"{spectrum.name}{title}")
-            columns.append(dict(zip(spectrum.wavelengths_nm.tolist(), values, strict=True)))
+            columns.append(dict(zip(labels, values, strict=True)))
     yield head
-    for nm in sorted({nm for column in columns for nm in column}):
-        yield [f"{nm:g}", *(column.get(nm) or missing for column in columns)]
+    for nm in sorted({nm for column in columns for nm in column}, key=float):
+        yield [nm, *(column.get(nm) or missing for column in columns)]
 
 
 def _columns(spectrum: NamedSpectrum) -> Iterator[tuple[str, list[str]]]:

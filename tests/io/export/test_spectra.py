@@ -71,6 +71,17 @@ def test_a_spectrum_is_read_again_as_a_reference(tmp_path: Path) -> None:
     np.testing.assert_allclose(curve.values, RAMP, atol=0.02 / 30**0.5 / 100)
 
 
+def test_a_wavelength_that_two_spectra_round_differently_is_one_row(tmp_path: Path) -> None:
+    bands = 430 + np.arange(57) * 4.1
+    tile = np.round(np.arange(4000, 7001) / 10, 1)
+    assert len({*bands.tolist()} - {*tile.tolist()}) > 0, "some differ in their last digits"
+    spectra = [NamedSpectrum("pin", bands, bands / 1000), NamedSpectrum("tile", tile, tile / 2000)]
+    path = export_spectra(spectra, tmp_path / "spectra.csv", SOURCE)
+    found = {each.name: each.curve for each in read_references(path).references}
+    np.testing.assert_allclose(found["pin"].wavelengths_nm, bands)
+    np.testing.assert_array_equal(found["tile"].wavelengths_nm, tile)
+
+
 def test_nothing_is_replaced_unasked_and_nothing_written_of_nothing(tmp_path: Path) -> None:
     path = export_spectra([REGION], tmp_path / "spectra.csv", {})
     with pytest.raises(StoreError, match="already exists"):
