@@ -38,10 +38,16 @@ def grid_of(result: xr.Dataset, every: int = 1) -> GridMesh:
     """Triangles of a result, of which only each ``every``-th row and column is used; raises `StoreError`."""
     require(result, "A mesh", "points_mm")
     points = plane(result, "points_mm")
+    size = f"{points.shape[2]} x {points.shape[1]}"
+    if min(points.shape[1:]) < 2:
+        raise StoreError(
+            f"A mesh needs two rows and two columns of pixels, and this result is {size}. Export its"
+            " points as PLY."
+        )
     if not 1 <= every <= min(points.shape[1:]) // 2:
         raise StoreError(
-            f"Every {every}th pixel was requested of a result of {points.shape[2]} x {points.shape[1]}."
-            " That leaves no surface. Choose 1 for all pixels, or a small number such as 4."
+            f"A step of {every} pixels was requested of a result of {size}. That leaves no surface. Choose 1"
+            " for all pixels, or a small number such as 4."
         )
     std = plane(result, "depth_std_mm") if "depth_std_mm" in result else None
     edge = (result["flags"].values & int(Flag.DEPTH_EDGE)) != 0 if "flags" in result else None

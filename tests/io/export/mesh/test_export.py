@@ -133,6 +133,18 @@ def test_a_surface_of_nothing_is_refused_in_one_sentence(tmp_path: Path) -> None
     result["points_mm"][:] = np.nan
     with pytest.raises(StoreError, match="No two neighbouring pixels"):
         export_mesh(result, tmp_path / "x.glb")
-    with pytest.raises(StoreError, match="Every 4th pixel"):
+    with pytest.raises(StoreError, match="step of 4 pixels"):
         export_mesh(small_result(), tmp_path / "x.glb", every=4)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("part", [{"y": [3]}, {"x": [3]}, {"x": [3], "y": [3]}])
+def test_a_row_or_column_of_pixels_is_told_to_be_no_surface(
+    tmp_path: Path, part: dict[str, list[int]]
+) -> None:
+    result = small_result().isel(part)
+    size = f"{result.sizes['x']} x {result.sizes['y']}"
+    with pytest.raises(
+        StoreError, match=f"needs two rows and two columns of pixels, and this result is {size}"
+    ):
+        export_mesh(result, tmp_path / "x.glb")
