@@ -47,8 +47,8 @@ _BESIDE = re.compile(
 )
 #: Words that say so where they are all of the title: "pixel 3" and "No. 2 blue" are spectra.
 _COUNTER = re.compile(
-    r"\W*(?:pixels?|chan(?:nels?)?|index|n[or]|id|row|zeile|#|cv|gloss|quality|detector)?"
-    r"(?: ?(?:n[or]|number|index))?(?:(?<=\w) ?[\[(][^\])]*[\])])?\W*",
+    r"\W*(?:pixels?|chan(?:nels?)?|index|n[or]|id|row|zeile|#|cv|quality|detector)?"
+    r"(?: ?(?:n[or]|number|index))?(?:(?<=\w) ?[\[(](?:%|nm|1|-)[\])])?\W*",
     re.IGNORECASE,
 )
 #: Where words of a title meet that are written together: "refl_std", "leafStd".

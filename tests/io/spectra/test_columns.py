@@ -206,7 +206,7 @@ def test_a_row_of_rising_or_falling_values_is_no_line_of_wavelengths(tmp_path: P
         "nm,mean,FWHM (nm)",
         "n,nm,R",
         "nm,R,bandwidth",
-        "nm,R,Gloss",
+        "nm,reflectance,quality",
     ],
 )
 def test_a_column_of_other_figures_does_not_make_shares_percent(tmp_path: Path, titles: str) -> None:
@@ -234,9 +234,10 @@ def test_a_figure_beside_reflectance_is_left_out_and_told_unless_it_can_be_one(t
     np.testing.assert_allclose(found.references[1].curve.values, LEAF / 2, rtol=1e-5)
 
 
-def test_letters_of_samples_are_names(tmp_path: Path) -> None:
-    found = read_columns(table(tmp_path / "a.csv", "nm,m,n", NM, LEAF, LEAF))
-    assert [each.name for each in found] == ["m", "n"]
+@pytest.mark.parametrize("names", [["m", "n"], ["matt", "gloss"], ["cv Gala", "detector 2"]])
+def test_words_of_samples_are_names(tmp_path: Path, names: list[str]) -> None:
+    found = read_columns(table(tmp_path / "a.csv", ",".join(["nm", *names]), NM, LEAF, LEAF))
+    assert [each.name for each in found] == names
 
 
 @pytest.mark.parametrize(
