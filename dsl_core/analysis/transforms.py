@@ -97,7 +97,7 @@ def upper_hull(nm: Floats, values: Floats) -> Floats:
                 break
             corners.pop()
         corners.append((x, y))
-    return np.interp(nm, *np.transpose(corners))
+    return np.asarray(np.interp(nm, *np.transpose(corners)))
 
 
 _FUNCTIONS = {
