@@ -39,8 +39,11 @@ def first_of(errors: SpectralErrors[Floats]) -> dict[str, float]:
 
 def known_of_first(errors: SpectralErrors[Floats], bands_nm: Floats) -> dict[str, float]:
     """As `first_of`, with NaN for colours of which bands (bands,), nm, hold too little."""
-    unknown = {} if hold_colour(bands_nm) else dict.fromkeys(("delta_e", "delta_e_scaled"), float("nan"))
-    return first_of(errors) | unknown
+    return first_of(errors) | _unknown_colours(bands_nm)
+
+
+def _unknown_colours(bands_nm: Floats) -> dict[str, float]:
+    return {} if hold_colour(bands_nm) else dict.fromkeys(("delta_e", "delta_e_scaled"), float("nan"))
 
 
 def spectral_errors(measured: Floats, truth: Floats, wavelengths_nm: Floats) -> SpectralErrors[Floats]:
@@ -132,13 +135,16 @@ MIN_BANDS = 5
 class SpectrumComparison(SpectralErrors[float]):
     """How a spectrum differs from a reference over the bands they share.
 
-    ``std`` has one standard deviation of each figure; None where no deviation of a band is known. Differences
-    of colour are NaN where these bands hold too little of one.
+    ``std`` has one standard deviation of each figure, and ``noise`` what each but the scale is of equal
+    spectra whose bands deviate as stated: no figure comes to zero, however equal spectra are. Both are None
+    where no deviation of a band is known. Differences of colour are NaN where these bands hold too little of
+    one.
     """
 
     bands: int
     range_nm: tuple[float, float]
     std: SpectralErrors[float] | None = None
+    noise: SpectralErrors[float] | None = None
 
 
 def compare(
@@ -174,11 +180,14 @@ def compare(
         None if std is None else np.asarray(std[shared], np.float64),
         None if reference.std is None else known.std,
     )
+    steps = [_steps(each, together) for each in stds]
+    equal = spectral_errors(measured, measured, bands)
     return SpectrumComparison(
         **known_of_first(found, bands),
         bands=count,
         range_nm=(float(bands[0]), float(bands[-1])),
-        std=_deviations(measured, wanted, bands, found, [_steps(each, together) for each in stds]),
+        std=_deviations(measured, wanted, bands, found, steps),
+        noise=_deviations(measured, measured, bands, equal, steps),
     )
 
 
@@ -219,4 +228,5 @@ def _deviations(
             squares[name] += float(((getattr(errors, name) - getattr(found, name)) ** 2).sum() / 2)
     if all(each is None for each in steps):
         return None
-    return SpectralErrors(**{name: float(np.sqrt(square)) for name, square in squares.items()})
+    deviations = {name: float(np.sqrt(square)) for name, square in squares.items()}
+    return SpectralErrors(**deviations | _unknown_colours(bands_nm))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dsl_core.analysis.band_noise import usual_correlation
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.spectral import compare, peak_width, spectral_errors
 from dsl_core.model.spectral import SpectralCurve, at_bands
@@ -156,8 +157,26 @@ def test_stated_deviations_are_those_of_figures_of_noisy_spectra(offset: float, 
         assert getattr(found.std, name) == pytest.approx(off, rel=0.12), name
 
 
+@pytest.mark.parametrize(("std", "offset"), [(0.005, 0.0), (0.02, 0.0), (0.005, 0.05)])
+def test_figures_of_equal_spectra_are_what_noise_alone_makes(std: float, offset: float) -> None:
+    curve, rng, correlation = (
+        SpectralCurve.of(GRID, TRUTH[:, 0]),
+        np.random.default_rng(8),
+        usual_correlation(GRID),
+    )
+    shots = std * rng.multivariate_normal(np.zeros(GRID.size), correlation, 200) + TRUTH[:, 0]
+    stated = np.full(GRID.size, std)
+    equal = [compare(shot, GRID, curve, stated, correlation) for shot in shots]
+    other = compare(TRUTH[:, 0] + offset * np.sin(GRID / 30), GRID, curve, stated, correlation)
+    for name in ("rmse", "angle_rad", "delta_e", "rmse_scaled"):
+        off = np.sqrt(np.mean([getattr(found, name) ** 2 for found in equal]))
+        assert getattr(other.noise, name) == pytest.approx(off, rel=0.25), name
+        assert getattr(equal[0].noise, name) == pytest.approx(off, rel=0.25), name
+
+
 def test_a_comparison_without_stated_deviations_has_none() -> None:
     curve = SpectralCurve.of(GRID, TRUTH[:, 0])
+    assert compare(0.9 * TRUTH[:, 0], GRID, curve).noise is None
     assert compare(0.9 * TRUTH[:, 0], GRID, curve).std is None
     assert compare(0.9 * TRUTH[:, 0], GRID, curve, np.full(len(GRID), np.nan)).std is None
 

@@ -100,7 +100,10 @@ def comparison_table(chosen: Mark, others: list[Mark], width_nm: float | None, t
 #: A narrow space.
 _THIN = chr(0x200A)
 #: What the deviations of a comparison are.
-_ABOUT = "±: one deviation, from those stated for the bands of one pixel."
+_ABOUT = (
+    "±: one deviation, from those stated for the bands of one pixel. Noise alone: what equal spectra would"
+    " differ by."
+)
 
 
 def _compared(
@@ -116,18 +119,24 @@ def _compared(
     low, high = found.range_nm
     # Nothing is extrapolated beyond the ends of a reference.
     only = "" if found.bands == len(spectrum.nm) else "only "
-    rows = []
     scaled = f"{only}{low:g}–{high:g} nm, scaled by {_figure(found, 'scale', 3)}"
-    for title, figures in (
-        (name, [_figure(found, *each) for each in (("rmse", 4), ("angle_rad", 4), ("delta_e", 2))]),
-        (
-            f"<span style='color:{theme.muted}'>{scaled}</span>",
-            [_figure(found, "rmse_scaled", 4), "", _figure(found, "delta_e_scaled", 2)],
-        ),
-    ):
+    decimals = {"rmse": 4, "angle_rad": 4, "delta_e": 2}
+    lines = [
+        (name, [_figure(found, *each) for each in decimals.items()]),
+        (_muted(scaled, theme), [_figure(found, "rmse_scaled", 4), "", _figure(found, "delta_e_scaled", 2)]),
+    ]
+    if found.noise is not None:
+        alone = [number_text(getattr(found.noise, each), places) for each, places in decimals.items()]
+        lines.insert(1, (_muted("noise alone", theme), alone))
+    rows = []
+    for title, figures in lines:
         cells = "".join(f"<td align='right'>{figure}</td>" for figure in figures)
         rows.append(f"<tr><td>{title}</td>{cells}</tr>")
     return rows
+
+
+def _muted(text: str, theme: Theme) -> str:
+    return f"<span style='color:{theme.muted}'>{text}</span>"
 
 
 def _figure(found: SpectrumComparison, name: str, decimals: int) -> str:

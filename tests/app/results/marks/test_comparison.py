@@ -30,6 +30,7 @@ def test_a_pin_is_compared_with_references_and_measured_to_other_pins(bench: Ben
     assert f"{np.sqrt(np.mean(BLUE**2)):.4f} ± 0.0028" in html
     assert "0.000 ± 0.019" in html
     assert html.count("2.000 ± 0.013") == 1
+    assert "noise alone</span></td><td align='right'>0.0100</td>" in html, "what is stated for the pixel"
     assert "one deviation, from those stated for the bands of one pixel" in html
     # Ten rows of 701.5 mm depth at 1/100 of it each.
     assert "70.150 ± 0.023 mm" in html
@@ -80,7 +81,7 @@ def test_a_short_reference_says_its_range(bench: Bench, tmp_path: Path) -> None:
     bench.control.marks.add_reference(short)
     html = select(bench, 0)
     assert "only 500–550 nm, scaled by" in html
-    assert html.count("<td align='right'>–</td>") == 2, "so few wavelengths have no colour"
+    assert html.count("<td align='right'>–</td>") == 3, "so few wavelengths have no colour"
 
 
 def test_a_region_says_how_its_pixels_differ_and_what_is_stated_for_one(bench: Bench) -> None:
