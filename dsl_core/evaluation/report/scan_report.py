@@ -175,7 +175,7 @@ def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list
 
 def _colour_caption(content: ReportContent) -> str:
     if "reflectance" in content.result and not hold_colour(_bands(content)):
-        return "in sRGB as if spectra went on straight around the bands, which hold too little of a colour"
+        return "in sRGB as if spectra continued straight around the bands, which hold too little of a colour"
     return "as seen under daylight (D65), in sRGB"
 
 

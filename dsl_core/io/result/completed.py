@@ -63,6 +63,6 @@ def missing_text(result: ResultArrays) -> str:
     if not hold_colour(bands):
         sentences.append(
             f"The bands, {bands.min():g} to {bands.max():g} nm, hold too little of a colour: the colours of"
-            " pictures are as if the spectra went on straight around them."
+            " pictures are as if the spectra continued straight around them."
         )
     return " ".join(sentences)
