@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -18,8 +19,6 @@ WELL_SEEN = 0.7
 UNCHANGED, MORE_NOISE = 0.03, 0.5
 #: A pixel is lit with a contrast of so many deviations.
 LIT_SIGMAS = 12.0
-#: On average it is so many, else two takes may differ by as much as other patterns do, from noise alone.
-CLEAR_SIGMAS = 20.0
 #: Edges of a pattern have moved from so many camera pixels and deviations on.
 MOVED_PX, MOVED_SIGMAS = 0.06, 4.0
 #: Pixels are near an edge if light changes there by this share of the contrast from pixel to pixel; so many
@@ -31,7 +30,7 @@ def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int], noise: Noise
     """The pairs with the most and the fewest stripes of those well seen; ``shape`` is that of the raster.
 
     Stripes rather than white: they move when anything does. The widest are not their own mirror image, as all
-    others of a Gray code are. None where there is too little light to tell one pattern from another.
+    others of a Gray code are. None where too few pixels are lit to tell one pattern from another.
     """
     if not pairs:
         return ()
@@ -41,7 +40,8 @@ def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int], noise: Noise
     for number, (one, other) in pairs.items():
         step = one.astype(np.float32) - other.astype(np.float32)
         seen = np.abs(step) > WELL_SEEN * np.maximum(contrast, 1.0)
-        if (seen & lit).sum() < WELL_SEEN * lit.sum() or not _is_clear(one, contrast, noise):
+        told = int(_is_told(one, contrast, noise).sum())
+        if (seen & lit).sum() < WELL_SEEN * lit.sum() or told < FEWEST_NEAR:
             continue
         grid, known = (step > 0).reshape(shape), (seen & lit).reshape(shape)
         changes = int(((grid[:, 1:] != grid[:, :-1]) & known[:, 1:] & known[:, :-1]).sum())
@@ -50,17 +50,17 @@ def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int], noise: Noise
     return tuple(dict.fromkeys(ends(found, key=lambda n: found[n]) for ends in (max, min))) if found else ()
 
 
-def _is_clear(picture: Counts, contrast: Floats, noise: Noise) -> bool:
-    """Whether another take of a picture is the same by `is_same`, whatever noise does."""
-    sigma = np.sqrt(noise.variance(picture))
-    lit = contrast > LIT_SIGMAS * sigma
-    return int(lit.sum()) >= FEWEST_NEAR and float((sigma[lit] / contrast[lit]).mean()) < 1 / CLEAR_SIGMAS
+def _is_told(picture: Counts, contrast: Floats, noise: Noise) -> NDArray[np.bool_]:
+    return np.asarray(contrast > LIT_SIGMAS * np.sqrt(noise.variance(picture)))
 
 
 def is_same(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise) -> bool:
-    """Whether a picture shows what it showed ``before``, as far as light reaches."""
+    """Whether a picture shows what it showed ``before``, as far as light reaches, whatever noise does."""
     contrast = _contrast(pairs.values())
-    return alike(seen, before, contrast, contrast > LIT_SIGMAS * np.sqrt(noise.variance(before)))
+    told = _is_told(before, contrast, noise)
+    sigma = np.sqrt((noise.variance(before) + noise.variance(seen))[told])
+    usual = math.sqrt(2 / math.pi) * float((sigma / contrast[told]).mean()) if told.any() else 0.0
+    return alike(seen, before, contrast, told, usual)
 
 
 def is_unchanged(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise) -> bool:

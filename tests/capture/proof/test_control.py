@@ -61,13 +61,28 @@ def test_stripes_between_unseen_pixels_are_not_counted() -> None:
     assert choose_pairs({1: stripes(1), 2: stripes(2)}, SHAPE, NOISE) == (1, 2)
 
 
-@pytest.mark.parametrize(("contrast", "chosen"), [(3.0, ()), (30.0, ()), (70.0, (2, 1))])
+@pytest.mark.parametrize(("contrast", "chosen"), [(3.0, ()), (30.0, ()), (45.0, (2, 1))])
 def test_nothing_is_a_control_that_noise_alone_makes_another_pattern(
     contrast: float, chosen: tuple[int, ...]
 ) -> None:
-    """Noise of 3.2 DN makes two takes of 30 DN differ by an eighth of it."""
     pairs = {1: stripes(8, contrast), 2: stripes(2, contrast)}
     assert choose_pairs(pairs, SHAPE, NOISE) == chosen
+
+
+@pytest.mark.parametrize("contrast", [45.0, 70.0])
+def test_noise_makes_no_take_another_and_hides_no_motion(contrast: float) -> None:
+    """Noise of 3.2 DN makes two takes of 45 DN differ by a twelfth of it."""
+    rng = np.random.default_rng(3)
+
+    def taken(exact: np.ndarray) -> np.ndarray:
+        return rng.normal(exact, 3.2).round().astype(np.uint16)
+
+    one, other = stripes(8, contrast)
+    pairs = {0: (taken(one), taken(other))}
+    moved = np.roll(one.reshape(SHAPE), 2, 1).ravel()
+    for _ in range(50):
+        assert is_same(taken(one), pairs[0][0], pairs, NOISE)
+        assert not is_same(taken(moved), pairs[0][0], pairs, NOISE)
 
 
 def test_a_take_is_the_same_where_light_reaches() -> None:

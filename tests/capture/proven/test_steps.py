@@ -53,6 +53,7 @@ class Bench:
         #: How often white at half its level is compared, and what that says.
         self.whites_seen, self.levels = list[bool](), ""
         self.recalled: dict[int, str] = {}
+        self.chosen: tuple[Shot, ...] = (SHOTS[0], SHOTS[4])
         #: So many of the next controls are wrong, whatever is the matter.
         self.odd_controls = 0
         #: How white is taken again to see if it settles.
@@ -82,7 +83,7 @@ class Bench:
         return ["No colour at all."] if with_colours else self.of_ends
 
     def controls(self) -> tuple[Shot, ...]:
-        return (SHOTS[0], SHOTS[4])
+        return self.chosen
 
     def is_as_before(self, control: Shot, pixels: object) -> bool:
         if self.odd_controls > 0:
@@ -622,6 +623,10 @@ def test_the_eight_pictures_before_a_wrong_one_are_withdrawn_back_to_the_last_co
     with pytest.raises(PictureError, match=r"2 frames between 21 and 22"):
         take_all(bench, lines[12:24])
     assert bench.withdrawn == [20, 21], "from the picture after which all was well"
+    bench = Bench(*[is_right] * 8, stepped, stepped, is_right, late)
+    bench.chosen = ()
+    with pytest.raises(PictureError, match=r"8 frames between 15 and 22"):
+        take_all(bench, lines[12:24])
 
 
 def test_everything_since_an_old_picture_last_looked_the_same_is_withdrawn_when_one_does_not() -> None:

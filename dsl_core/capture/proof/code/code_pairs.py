@@ -6,6 +6,7 @@ for every pair of a code. A picture that shows anything else breaks the sum of i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -107,12 +108,12 @@ class CodePairs:
         return ratios if any(not SAME_LIGHT[0] < ratio < SAME_LIGHT[1] for ratio in ratios) else None
 
 
-def alike(one: Counts, other: Counts, contrast: Floats, lit: NDArray[np.bool_]) -> bool:
-    """Whether two pictures show the same pattern, where ``lit``."""
+def alike(one: Counts, other: Counts, contrast: Floats, lit: NDArray[np.bool_], noise: float = 0.0) -> bool:
+    """Whether two pictures show the same pattern, where ``lit``; ``noise`` is its mean share of contrast."""
     if not lit.any():
         return False
     apart = np.abs(one[lit].astype(np.float32) - other[lit].astype(np.float32)) / contrast[lit]
-    return bool(np.minimum(apart, 1).mean() < ALIKE)
+    return bool(np.minimum(apart, 1).mean() < math.hypot(ALIKE, noise))
 
 
 def end_of(broken: NDArray[np.bool_], counted: NDArray[np.bool_]) -> bool:
