@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QTimer, Signal
@@ -32,12 +33,27 @@ FETCH_MS = 15
 SIDE_PX, WIDE_SIDE_PX, WIDEST_SIDE_PX = 268, 440, 640
 
 
+#: A step of exposures that are shorter than any cycle of the LEDs.
+FREE_STEP = 1.25
+
+
 class ExposureBox(NumberBox):
-    """An exposure in steps of whole LED cycles, from the nearest: steps from what is rounded would add up."""
+    """An exposure in steps of whole LED cycles: steps from what is rounded would add up."""
 
     def stepBy(self, steps: int) -> None:
-        """Go to the whole number of cycles that is so many steps away."""
-        self.setValue((round(self.value() / self.singleStep()) + steps) * self.singleStep())
+        """Go so many whole cycles on, from the one that was passed last; below the first one by shares."""
+        cycle, last_digit = self.singleStep(), 10.0 ** -self.decimals()
+        # What is shown is rounded: a whole number of cycles stays the one it was.
+        hair = last_digit / cycle * (1 if steps > 0 else -1)
+        at = self.value() / cycle + hair
+        to = (math.floor(at) if steps > 0 else math.ceil(at)) + steps
+        if to >= 1 and self.maximum() >= cycle:
+            self.setValue(to * cycle)
+            return
+        share = self.value() * FREE_STEP**steps
+        self.setValue(
+            max(share, self.value() + last_digit) if steps > 0 else min(share, self.value() - last_digit)
+        )
 
 
 class RigPage(PageWidget):

@@ -22,8 +22,9 @@ _WAVENUMBER = re.compile(r"wave ?number|cm\s?(?:\^?-1|⁻¹)|1/cm", re.IGNORECAS
 _PERCENT = re.compile(
     r"(?:(?<!\d)(?<!\d )|(?<![\d.])0 ?(?:-|–|\.\.+|…|to) ?100 ?)(?:%|percent)", re.IGNORECASE
 )
-#: The unit of spectrometers, which only a title has behind the number of a sample: "leaf 12 %R".
-_PERCENT_R = re.compile(r"% ?[RT]\b")
+#: The unit of spectrometers, which only a title has behind the number of a sample: "leaf 12 %R". A tile of
+#: "12 % reflectance" has that, with a space, as its name.
+_PERCENT_R = re.compile(r"%(?: ?[RT]\b|refl|trans)", re.IGNORECASE)
 _UNIT_LINE = re.compile(r"\W*(?:y[- ]?)?units?\b", re.IGNORECASE)
 #: In the order in which they are tried; a unit of power decides before all of them.
 _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (

@@ -11,7 +11,7 @@ from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.rig.controller import LiveController
 from dsl_app.rig.options_form import parse_options
-from dsl_app.rig.page import RigPage
+from dsl_app.rig.page import ExposureBox, RigPage
 from dsl_app.rig.state import LOST_PICTURE, NO_RIG, WAITING, cycles_text
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.theme import LIGHT
@@ -376,3 +376,26 @@ def test_a_scene_chosen_during_a_scan_is_not_shown_as_if_it_were_connected(
     click(page.connect_button)
     qtbot.waitUntil(lambda: dict(state.choice.value.options)["scene"] == "face", timeout=90_000)
     qtbot.waitUntil(lambda: page.connect_button.text() == "Disconnect", timeout=90_000)
+
+
+@pytest.mark.parametrize(
+    ("cycle_ms", "most_ms", "start_ms", "up_ms", "down_ms"),
+    [
+        (1000 / 24, 3e4, 60.0, 83.333, 41.667),
+        (1000 / 24, 3e4, 65.0, 83.333, 41.667),
+        (1000 / 24, 3e4, 1000 / 24, 83.333, 33.333),
+        (1000 / 24, 30.0, 10.0, 12.5, 8.0),
+        (1.0, 5.0, 1.5, 2.0, 1.0),
+        (1.0, 5.0, 0.01, 1.0, 0.009),
+    ],
+)
+def test_steps_of_the_exposure_miss_no_cycle_and_have_shares_below_the_first(
+    qtbot: QtBot, cycle_ms: float, most_ms: float, start_ms: float, up_ms: float, down_ms: float
+) -> None:
+    box = ExposureBox("Exposure", 0.001, most_ms, start_ms, "ms", 3, "")
+    qtbot.addWidget(box)
+    box.setSingleStep(cycle_ms)
+    for steps, wanted in ((1, up_ms), (-1, down_ms)):
+        box.setValue(start_ms)
+        box.stepBy(steps)
+        assert box.value() == pytest.approx(wanted, abs=0.0011)

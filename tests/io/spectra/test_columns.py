@@ -60,6 +60,8 @@ def test_a_column_that_counts_rows_under_no_title_is_no_spectrum(tmp_path: Path)
         ("Unit: 0 to 100 percent", "Wavelength,Reflectance", 0.01),
         ("own", "Wavelength,Reflectance (0–100 %)", 0.01),
         ("own", "Wavelength,sample 12 %R", 0.01),
+        ("own", "Wavelength,sample 12 %Reflectance", 0.01),
+        ("own", "Wavelength,sample 12 %r", 0.01),
         ("own", "Wavelength,leaf 3 % T", 0.01),
         ("own", "Wavelength,Reflectance of leaf 3 %R", 0.01),
         # None of these is the unit of the values.
