@@ -59,6 +59,11 @@ class CampaignFolder:
     def open(cls, path: Path) -> Self:
         """A campaign that was begun before; raises `StoreError`."""
         if not (path / CAMPAIGN_NAME).is_file():
+            if is_lost_campaign(path):
+                raise StoreError(
+                    f"{path} holds the captures of a campaign, but no {CAMPAIGN_NAME}. Begin a campaign of this"
+                    " name with its rig and options: what was captured is kept."
+                )
             raise StoreError(
                 f"{path} is not a campaign: it has no {CAMPAIGN_NAME}. Give the folder of a campaign."
             )
@@ -189,9 +194,14 @@ def take_campaign(path: Path) -> FolderLock:
     return lock
 
 
+def is_lost_campaign(path: Path) -> bool:
+    """Whether a folder holds the captures of a campaign whose own file is not there any more."""
+    return not (path / CAMPAIGN_NAME).exists() and any(path.glob(f"*/*/{NOTE_NAME}"))
+
+
 def _require_room(path: Path, rig: str | None) -> None:
     """Raise `StoreError` where a campaign would take other files, or captures of another rig, for its own."""
-    if any(path.glob(f"*/*/{NOTE_NAME}")):
+    if is_lost_campaign(path):
         if rig is None:
             raise StoreError(
                 f"{path} holds the captures of a campaign, but no {CAMPAIGN_NAME}. To continue it, name its"

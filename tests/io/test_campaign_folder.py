@@ -114,6 +114,8 @@ def test_a_campaign_whose_first_file_is_damaged_can_be_continued_as_it_advises(
     with pytest.raises(StoreError, match=r"cut off.* delete it and begin the campaign in this folder again"):
         CampaignFolder.open(campaign.path)
     path.unlink()
+    with pytest.raises(StoreError, match=r"Begin a campaign of this name with its rig and options"):
+        CampaignFolder.open(campaign.path)
     with pytest.raises(StoreError, match=r"holds the captures of a campaign.*--rig"):
         CampaignFolder.begin(campaign.path, None, {})
     again = CampaignFolder.begin(campaign.path, "twin", {"size": "32x24"})

@@ -19,6 +19,7 @@ from dsl_app.shared.widgets.dialogs import dialog_buttons
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_parts
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.open_dialog import OpenDialog
+from dsl_core.io.campaign_folder import is_lost_campaign
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.controller import CalibrateController
@@ -68,14 +69,16 @@ class NewCampaignDialog(QDialog):
             self.folder.setText(name)
 
     def _check(self) -> None:
-        trouble = ""
+        trouble = told = ""
         if not self.name.text().strip() or "/" in self.name.text():
             trouble = "Give the campaign a name without slashes."
         elif barred := place_trouble(self.target):
             trouble = barred
+        elif is_lost_campaign(self.target):
+            told = "Captures of a campaign are in this folder. It begins again with them, for this rig."
         elif there(self.target):
             trouble = f"{self.target.name} already exists in this folder. Choose another name, or open it."
-        self._text.setText(trouble)
+        self._text.setText(trouble or told)
         self.begin.setEnabled(not trouble)
 
 

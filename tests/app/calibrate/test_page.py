@@ -176,3 +176,18 @@ def test_a_campaign_is_not_begun_where_it_cannot_be(
     dialog.name.setText(name)
     assert not dialog.begin.isEnabled()
     assert told in dialog._text.text()
+
+
+def test_a_campaign_that_lost_its_file_is_begun_again_with_its_captures(qtbot: QtBot, tmp_path: Path) -> None:
+    host = QWidget()
+    qtbot.addWidget(host)
+    step = tmp_path / "lab" / "geometry" / "pose-01"
+    step.mkdir(parents=True)
+    (step / "capture.json").write_text("{}")
+    dialog = NewCampaignDialog(tmp_path, "twin", host)
+    dialog.name.setText("lab")
+    assert dialog.begin.isEnabled()
+    assert "begins again with them" in dialog._text.text()
+    (tmp_path / "lab" / "campaign.json").write_text("{}")
+    dialog._check()
+    assert not dialog.begin.isEnabled()
