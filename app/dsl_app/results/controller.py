@@ -224,7 +224,9 @@ class ResultsController:
     def export(self) -> ExportController | None:
         """What writes files of the result as it is looked at now; None where no saved one is shown."""
         result = self.shown_result()
-        return result and ExportController(result, self.state, self._runner, self._notifier)
+        if result is None:
+            return None
+        return ExportController(result, self.state, self._runner, self._notifier)
 
     def shown_result(self) -> ResultArrays | None:
         """The result that something is to be done with; says so where an offer hides it."""

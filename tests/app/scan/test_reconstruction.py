@@ -26,10 +26,12 @@ def test_the_first_of_two_that_ends_leaves_the_other_running(
         made.start(tmp_path / f"{name}.dsl")
     if is_cancelled:
         runner.waiting[0].cancel()
+    running: list[bool] = []
+    state.is_reconstructing.follow(running.append)
     runner.run_next()
-    assert state.is_reconstructing.value
+    assert running == [True]
     assert state.note.value.startswith("All frames of b are saved. Reconstructing")
     runner.run_next()
-    assert not state.is_reconstructing.value
+    assert running == [True, False]
     assert state.note.value == f"The result is saved in {tmp_path / 'b.zarr'}."
     made.close()

@@ -292,16 +292,18 @@ def test_predictions_for_the_last_scan_follow_each_further_scan(
     monkeypatch.setattr(samples, "scene_samples", lambda *_: "the scene")
     control, saved = forecast(bench, tmp_path), write_small_result(tmp_path)
     first, second, third = (copytree(saved, tmp_path / f"{name}.zarr") for name in ("a", "b", "c"))
+    looks: list[Path | None] = []
+    control.state.look.follow(looks.append)
     bench.state.result.emit(first)
-    assert control.state.look.value is None
+    assert looks == [None]
     control.look(first)
     done = len(counted)
     bench.state.result.emit(second)
-    assert control.state.look.value == second
+    assert looks == [None, first, second]
     assert len(counted) > done
     control.look(None)
     bench.state.result.emit(third)
-    assert control.state.look.value is None
+    assert looks[3:] == [None]
 
 
 def test_a_look_of_another_size_says_so(bench: ScanBench, tmp_path: Path, counted: list[str]) -> None:
