@@ -68,7 +68,7 @@ def test_what_else_was_made_of_a_file_is_told(tmp_path: Path) -> None:
     _csv(tmp_path / "leaf.csv", values, SHARE + 60, titles=("reflectance", "steps"))
     library = read_library([tmp_path])
     assert len(library.entries) == 1
-    assert "leaf.csv: left out, as values above 2 are no share: steps." in library.notes
+    assert "leaf.csv: left out, as values above 2 cannot be shares: steps." in library.notes
     assert "leaf.csv: values below -0.9 are taken as deleted: 1." in library.notes
 
 

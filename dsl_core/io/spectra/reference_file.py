@@ -60,7 +60,7 @@ def shares_of(path: Path, raw: list[Spectrum]) -> tuple[list[Spectrum], float | 
     spectra, kept = [as_share(path, each, bool(percent)) for each in found], {id(each) for each in found}
     notes = []
     if beside := [each.name for each in raw if each.quantity == "unstated" and id(each) not in kept]:
-        notes.append(f"left out, as values above {MOST_SHARE:g} are no share: {', '.join(beside[:5])}.")
+        notes.append(f"left out, as values above {MOST_SHARE:g} cannot be shares: {', '.join(beside[:5])}.")
     before, after = (sum(int(np.isnan(s.values).sum()) for s in group) for group in (found, spectra))
     if deleted := after - before:
         notes.append(f"values below {LEAST_SHARE:g} are taken as deleted: {deleted}.")

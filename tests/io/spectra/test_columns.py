@@ -229,7 +229,7 @@ def test_a_figure_beside_reflectance_is_left_out_and_told_unless_it_can_be_one(t
     found = read_references(path)
     assert [each.name for each in found.references] == ["reflectance", "bark"]
     np.testing.assert_allclose(found.references[0].curve.values, LEAF, rtol=1e-5)
-    assert found.notes == ("left out, as values above 2 are no share: steps.",)
+    assert found.notes == ("left out, as values above 2 cannot be shares: steps.",)
     path = table(path, "nm,reflectance,bark", NM, LEAF * 100, LEAF * 50)
     found = read_references(path)
     assert found.notes == ()
