@@ -107,7 +107,7 @@ class RegionSpectrum:
     @property
     def mean_std(self) -> NDArray[np.float64]:
         """What the mean is uncertain by, (bands,), as stated deviations hang together from pixel to pixel."""
-        return self.pixel_std * np.sqrt(left_of_variance(max(self.used, 1)))
+        return np.asarray(self.pixel_std * np.sqrt(left_of_variance(max(self.used, 1))))
 
 
 def region_spectrum(reflectance: Floats, std: Floats, data_share: Floats, mask: Mask) -> RegionSpectrum:

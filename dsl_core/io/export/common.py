@@ -56,7 +56,7 @@ def colours(result: xr.Dataset) -> NDArray[np.float32] | None:
 
 def wavelengths_nm(result: xr.Dataset) -> list[float]:
     """Band centres of the result; raises `StoreError` where a band has none of its own."""
-    return wavelengths_of(result).tolist()
+    return [float(nm) for nm in wavelengths_of(result)]
 
 
 def provenance(result: xr.Dataset) -> dict[str, str]:
