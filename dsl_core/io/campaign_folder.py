@@ -61,8 +61,8 @@ class CampaignFolder:
         if not (path / CAMPAIGN_NAME).is_file():
             if is_lost_campaign(path):
                 raise StoreError(
-                    f"{path} holds the captures of a campaign, but no {CAMPAIGN_NAME}. Begin a campaign of this"
-                    " name with its rig and options: what was captured is kept."
+                    f"{path} holds the captures of a campaign, but no {CAMPAIGN_NAME}. Begin a campaign of"
+                    " this name with its rig and options: what was captured is kept."
                 )
             raise StoreError(
                 f"{path} is not a campaign: it has no {CAMPAIGN_NAME}. Give the folder of a campaign."
