@@ -77,7 +77,9 @@ def with_finer_bands_first(findings: Iterable[FitFinding], step_nm: float) -> li
     )
     return [
         each.model_copy(update={"advice": first + each.advice[0].lower() + each.advice[1:]})
-        if each.significant and each.name in BY_WIDE_BANDS | {GAIN_OF_BOTH, ORDERS_APART}
+        if each.significant
+        and each.part != "film"
+        and each.name in BY_WIDE_BANDS | {GAIN_OF_BOTH, ORDERS_APART}
         else each
         for each in findings
     ]

@@ -78,3 +78,8 @@ def test_before_a_rig_is_blamed_bands_are_made_finer(name: str, step_nm: float) 
     assert found[0].advice.startswith("Reconstruct with bands of 5 nm first: ones of 10 nm") == first
     assert found[0].advice.endswith("If it stays: do it." if first else "Do it.")
     assert found[0].significant
+    # Without a film there is no light in any band.
+    (missing,) = with_finer_bands_first(
+        [finding(name, 0.98, "It differs.").model_copy(update={"part": "film"})], step_nm
+    )
+    assert missing.advice == "Do it."
