@@ -26,7 +26,7 @@ from dsl_core.calibration.film.order_samples import OrderSamples, grating_column
 from dsl_core.calibration.film.residual import MIN_GAIN, choose_residual
 from dsl_core.calibration.film.zero_place import require_still
 from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, refine_planes
-from dsl_core.calibration.geometry.stage_planes import with_unsure_zero
+from dsl_core.calibration.geometry.stage_planes import MAX_STEP_MM, STAGE_SIGMAS, with_unsure_zero
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.depth_stage import (
     DepthStageCalibration,
@@ -284,6 +284,7 @@ def _positions(data: StageData, planes: PlaneRefinement) -> tuple[StagePosition,
             column_limit_px=float(planes.limit_px[k]),
             step_error_mm=float(planes.step_error_mm[k]),
             step_std_mm=float(planes.step_std_mm[k]),
+            step_limit_mm=max(MAX_STEP_MM, STAGE_SIGMAS * data.stage_std_mm),
         )
         for k, (position, plane) in enumerate(zip(data.positions_mm, planes.planes, strict=True))
     )

@@ -168,7 +168,7 @@ def _start(
 ) -> tuple[Floats, Floats, float]:
     """Slopes (positions, 2) of each plane for itself, the start of a joint fit, and how long steps are."""
     slopes, distances, _ = _alone(rig, positions_mm, samples, stage_std_mm)
-    rise = require_steps(positions_mm, distances)
+    rise = require_steps(positions_mm, distances, stage_std_mm)
     start = np.zeros(STEPS + len(samples))
     start[SLOPES] = slopes.mean(0)
     steps = np.asarray(positions_mm) - positions_mm[0]

@@ -38,8 +38,9 @@ GAIN_STD = 1e-4
 BOW_RADIUS_MM = 150.0
 #: Tiles a position needs.
 MIN_TILES = 30
-#: What a stage may be off (mm) before it is taken as wrong, and by how much its scale.
-MAX_STEP_ERROR_MM, MAX_SCALE_ERROR = 0.3, 0.02
+#: What a stage may be off (mm) before it is taken as wrong, and by how much its scale; what its steps may be
+#: off in the end; and in deviations that are stated for it, such as those of a ruler, the larger.
+MAX_STEP_ERROR_MM, MAX_SCALE_ERROR, MAX_STEP_MM, STAGE_SIGMAS = 0.3, 0.02, 0.1, 3.0
 #: What a board leaves open of the scale.
 UNSURE_SCALE = 0.002
 #: How far columns may scatter about a plane: what models of lenses and of line profiles leave (px), the share
@@ -188,13 +189,18 @@ def require_enough(position_mm: float, samples: ColumnSamples) -> None:
         )
 
 
-def require_steps(positions_mm: Sequence[float], distances_mm: Sequence[float] | Floats) -> float:
+def require_steps(
+    positions_mm: Sequence[float], distances_mm: Sequence[float] | Floats, stage_std_mm: float
+) -> float:
     """How many times as far apart as the stage says the planes stand by the geometry before it is refined.
 
-    Raises `CalibrationError` when that is far from one, or one of them stands elsewhere.
+    Raises `CalibrationError` when that is far from one, or one of them stands elsewhere, beyond what the
+    stage's own deviation explains.
     """
     positions = np.asarray(positions_mm, float)
-    tolerance = MAX_STEP_ERROR_MM + UNSURE_SCALE * float(np.ptp(positions))
+    own_mm = STAGE_SIGMAS * stage_std_mm
+    tolerance = max(MAX_STEP_ERROR_MM, own_mm) + UNSURE_SCALE * float(np.ptp(positions))
+    most_scale = max(MAX_SCALE_ERROR, own_mm / float(np.linalg.norm(positions - positions.mean())))
     distances = np.asarray(distances_mm, float)
     rise, offset = np.polyfit(positions - positions.mean(), distances, 1)
     bent = np.abs(distances - offset - rise * (positions - positions.mean())).max() > tolerance
@@ -214,7 +220,7 @@ def require_steps(positions_mm: Sequence[float], distances_mm: Sequence[float] |
             " where the other positions put it. Check that the stage reached it and that nothing else"
             " moved, that all was captured with this rig, and capture this position again."
         )
-    if abs(rise - 1) > MAX_SCALE_ERROR:
+    if abs(rise - 1) > most_scale:
         raise CalibrationError(
             f"The planes are {rise:.3f} times as far apart as the stage's positions"
             f" {', '.join(f'{p:g}' for p in positions)} mm. Check the unit of the stage, that it moves along"

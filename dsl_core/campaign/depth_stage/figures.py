@@ -10,8 +10,8 @@ from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, StagePosition
 from dsl_core.model.figure import Figure, doubts
 
-#: Error of a stage's step, mm; error of columns that a fit never saw, px.
-MAX_STEP_MM, MAX_HELD_OUT_PX = 0.1, 0.3
+#: Error of columns that a fit never saw, px.
+MAX_HELD_OUT_PX = 0.3
 #: One plane scatters for itself when all others have less than this share of its scatter of columns.
 ALONE = 0.5
 #: How far planes may move the geometry, in its deviations, before it is in doubt.
@@ -71,8 +71,9 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             value=abs(step.step_error_mm),
             unit="mm",
             std=step.step_std_mm,
-            high=MAX_STEP_MM,
-            advice=f"Check the stage at {step.position_mm:g} mm; repeat the geometry with more poses.",
+            high=step.step_limit_mm,
+            advice=f"Check the stage at {step.position_mm:g} mm; if its positions are read less well than"
+            " stated, say so (stage_std_mm); repeat the geometry with more poses.",
         ),
         Figure(
             name="correction of the geometry by the planes",

@@ -254,7 +254,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         planes = [self._plane(bench, each, progress, each is step) for each in plain]
         if len(planes) > 1:
             with naming(step):
-                _require_steps(planes)
+                _require_steps(planes, self.stage_std_mm)
 
     def _plane(self, bench: Bench, step: Step, progress: Progress, new: bool) -> PlaneNote:
         """Where a position's plane stands, as noted when it was captured if the geometry is still that."""
@@ -317,11 +317,12 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         return chain_correction(rig, scans, reflectance=self.reflectance)
 
 
-def _require_steps(planes: Sequence[PlaneNote]) -> None:
+def _require_steps(planes: Sequence[PlaneNote], stage_std_mm: float) -> None:
     """Raise `CalibrationError` when the last plane stands elsewhere than the stage says, and why it may."""
     last = planes[-1]
     try:
-        require_steps([each.position_mm for each in planes], [each.distance_mm for each in planes])
+        places = [each.position_mm for each in planes], [each.distance_mm for each in planes]
+        require_steps(*places, stage_std_mm)
     except CalibrationError as error:
         others_px = max(each.column_rms_px for each in planes[:-1])
         if last.column_rms_px < last.column_limit_px + LESS_FLAT * others_px:

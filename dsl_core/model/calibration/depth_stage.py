@@ -16,7 +16,8 @@ class StagePosition(Record):
 
     ``plane_rms_mm`` is the scatter of the points about it, ``column_rms_px`` the same in projector columns
     and ``column_limit_px`` what that may be (in older records what lenses and line profiles leave);
-    ``step_error_mm`` is how far the plane stands from where the stage says, relative to the other positions.
+    ``step_error_mm`` is how far the plane stands from where the stage says, relative to the other positions,
+    and ``step_limit_mm`` what that may be (in older records what a stage leaves, not a ruler).
     """
 
     position_mm: float
@@ -27,6 +28,7 @@ class StagePosition(Record):
     column_limit_px: float = 0.03
     step_error_mm: float
     step_std_mm: float
+    step_limit_mm: float = 0.1
 
     @property
     def plane_limit_mm(self) -> float:

@@ -115,16 +115,27 @@ def test_the_limit_of_a_plane_is_in_columns_and_follows_the_capture(
     assert column_limit_px(samples) == pytest.approx(expected)
 
 
+def test_positions_read_from_a_ruler_may_be_off_as_stated() -> None:
+    ruler = [620.5, 739.2, 850.9]
+    assert require_steps([620.0, 740.0, 850.0], ruler, 0.5) == pytest.approx(1.0, abs=3e-3)
+    with pytest.raises(CalibrationError, match=r"position 740 mm is -1\.30 mm"):
+        require_steps([620.0, 740.0, 850.0], ruler, 0.02)
+    assert require_steps([700.0, 720.0], [700.0, 720.5], 0.5) == pytest.approx(1.025)
+    for far_mm, std_mm in ((720.5, 0.02), (723.0, 0.5)):
+        with pytest.raises(CalibrationError, match="times as far apart"):
+            require_steps([700.0, 720.0], [700.0, far_mm], std_mm)
+
+
 def test_steps_flatness_and_agreement_have_limits() -> None:
     at = [0.0, 100.0, 200.0]
-    assert require_steps(at, np.array([600.0, 700.5, 801.0])) == pytest.approx(1.005)
+    assert require_steps(at, np.array([600.0, 700.5, 801.0]), 0.02) == pytest.approx(1.005)
     with pytest.raises(CalibrationError, match=r"position 100 mm is \+2.00 mm"):
-        require_steps(at, np.array([600.0, 702.0, 800.0]))
+        require_steps(at, np.array([600.0, 702.0, 800.0]), 0.02)
     with pytest.raises(CalibrationError, match=r"1\.030 times as far apart"):
-        require_steps(at, np.array([600.0, 703.0, 806.0]))
+        require_steps(at, np.array([600.0, 703.0, 806.0]), 0.02)
     for towards in ([800.0, 700.0, 600.0], [800.0, 698.0, 600.0]):
         with pytest.raises(CalibrationError, match=r"0, 100, 200 mm .* 800\.0, .* counts towards the camera"):
-            require_steps(at, np.array(towards))
+            require_steps(at, np.array(towards), 0.02)
     require_plane(at, np.array([0.1, 0.49, 0.1]))
     with pytest.raises(CalibrationError, match=r"position 100 mm are 0\.51 px RMS off those of a plane"):
         require_plane(at, np.array([0.1, 0.51, 0.1]))

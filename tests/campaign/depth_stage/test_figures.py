@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
 import pytest
 
+from dsl_core.calibration.film.depth_stage import StageData, _positions
 from dsl_core.campaign.depth_stage.figures import CURVES_ADVICE, depth_stage_figures
 from dsl_core.campaign.depth_stage.recipe import StageNote, _filter_of
 from dsl_core.model.calibration.chain import ChainCorrection
@@ -11,6 +16,7 @@ from dsl_core.model.calibration.depth_stage import DepthStageCalibration, HeldOu
 from dsl_core.model.figure import Figure
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import nominal_filter
+from dsl_core.optics.shading import Plane
 from dsl_core.simulation.published_rig import published_rig
 
 RIG = published_rig()
@@ -45,7 +51,17 @@ def figure_of(
         )
         for mm, px in rms_px.items()
     )
-    record = DepthStageCalibration.model_construct(
+    record = record_of_positions(positions, chain, indices)
+    return next(each for each in depth_stage_figures(record) if each.name == name)
+
+
+def record_of_positions(
+    positions: tuple[StagePosition, ...],
+    chain: ChainCorrection | None = None,
+    indices: tuple[tuple[float, float], tuple[float, float]] | None = None,
+) -> DepthStageCalibration:
+    """A record of these positions, of which the rest is as it should be."""
+    return DepthStageCalibration.model_construct(
         positions=positions,
         film=RIG.film,
         film_std=FILM_STD,
@@ -58,7 +74,6 @@ def figure_of(
         filter_index_before=None if indices is None else indices[1],
         warnings=(),
     )
-    return next(each for each in depth_stage_figures(record) if each.name == name)
 
 
 def plane_figure(rms_px: dict[float, float], limit_px: float = 0.04) -> Figure:
@@ -72,6 +87,26 @@ def test_the_same_error_of_columns_passes_at_every_distance() -> None:
     assert figure.passed
     assert plane_figure({600.0: 0.02, 900.0: 0.026}).value == pytest.approx(0.38, abs=0.005)
     assert figure.high == pytest.approx(0.04 * MM_PER_PX[600.0])
+
+
+def test_steps_may_be_off_by_what_positions_are_stated_to() -> None:
+    """A ruler that is read to half a millimetre is no broken stage."""
+    never: Any = None
+    for std_mm, limit_mm in ((0.02, 0.1), (0.5, 1.5)):
+        data = StageData((600.0, 800.0), std_mm, (), (), lambda position, name: never, 2)
+        both = np.full(2, 0.01)
+        planes: Any = SimpleNamespace(
+            planes=[Plane(np.array([0.0, 0.0, 1 / 600])), Plane(np.array([0.0, 0.0, 1 / 800]))],
+            plane_rms_mm=both,
+            residual_rms_px=both,
+            limit_px=both,
+            step_error_mm=np.array([0.54, -0.54]),
+            step_std_mm=both,
+        )
+        record = record_of_positions(_positions(data, planes))
+        figure = next(f for f in depth_stage_figures(record) if f.name == "error of the stage's steps")
+        assert (figure.high, figure.passed) == (pytest.approx(limit_mm), limit_mm > 0.54)
+        assert "stage_std_mm" in figure.advice
 
 
 def test_planes_that_all_scatter_do_not_put_the_blame_on_the_target() -> None:

@@ -27,7 +27,7 @@ from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import boxed, column_of, tabs_of
-from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_STEP_MM
+from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.rig import Film
 from dsl_core.solve.normal import BAND_95
@@ -161,7 +161,8 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         std = np.array([position.step_std_mm for position in record.positions])
         draw_points(box, at, error, std, theme.pins[0])
         box.item.setXRange(at.min(), at.max(), padding=0.1)
-        range_about_zero(box, 1.2 * float((np.abs(error) + BAND_95 * std).max()), MAX_STEP_MM, theme)
+        limit_mm = record.positions[0].step_limit_mm
+        range_about_zero(box, 1.2 * float((np.abs(error) + BAND_95 * std).max()), limit_mm, theme)
         pull = f"correction of the geometry by the planes {record.geometry_pull:.2f} standard deviations"
         box.name_curves((pull, theme.text, ""))
 
