@@ -25,7 +25,7 @@ from dsl_core.calibration.colour.patches import (
     patch_samples,
 )
 from dsl_core.campaign.common.bounds import Finite, Positive
-from dsl_core.campaign.common.depths import seen_whole_mm
+from dsl_core.campaign.common.depths import seen_whole_mm, target_depth_mm
 from dsl_core.campaign.common.flat_target import WHITE, capture_uniform, read_uniform
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.white_shot import other_light, shoot_white
@@ -80,7 +80,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
             raise CalibrationError(
                 f"There are no reflectances for a chart {self.chart!r}; choose {', '.join(chart_names())}."
             )
-        depth_mm = seen_whole_mm(bench.rig, PATCHES_MM) if self.depth_mm is None else self.depth_mm
+        depth_mm = target_depth_mm(bench.rig, self.depth_mm or seen_whole_mm(bench.rig, PATCHES_MM))
         return (
             Step(
                 "chart",

@@ -5,16 +5,37 @@ from __future__ import annotations
 import numpy as np
 
 from dsl_core.devices.base import Stage
+from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import USUAL_DEPTH, Rig
 from dsl_core.optics.pinhole import project
 
+#: By this factor a flat target may stand nearer or farther than the depths that a rig is for.
+BESIDE = 2.0
 #: Shares of the depth range at which a flat target stands that is not seen as a whole where it usually does.
 FARTHER = np.arange(USUAL_DEPTH + 0.05, 0.96, 0.05)
 
 
 def target_depth_mm(rig: Rig, wanted_mm: float | None) -> float:
-    """Where a flat target stands: at ``wanted_mm``, or where the rig has most room before and behind it."""
-    return rig.usual_depth_mm if wanted_mm is None else wanted_mm
+    """Where a flat target stands: at ``wanted_mm``, or where the rig has most room before and behind it.
+
+    Raises `CalibrationError` for a distance far from those that the rig is for.
+    """
+    if wanted_mm is None:
+        return rig.usual_depth_mm
+    near, far = target_range_mm(rig)
+    if not near < wanted_mm < far:
+        low, high = rig.depth_range_mm
+        raise CalibrationError(
+            f"A target at depth_mm={wanted_mm:g} was asked for; this rig is for {low:g} to {high:g} mm."
+            " Choose a distance in between, or state another depth_range_mm in the rig's nominal figures."
+        )
+    return wanted_mm
+
+
+def target_range_mm(rig: Rig) -> tuple[float, float]:
+    """Between which distances a flat target counts as one: its plane is known beside the range as well."""
+    low, high = rig.depth_range_mm
+    return low / BESIDE, high * BESIDE
 
 
 def seen_whole_mm(rig: Rig, size_mm: tuple[float, float]) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.colour.color_checker import LIGHTS
 from dsl_core.calibration.common.plane import TargetPlane, bulge_mm, fit_plane
 from dsl_core.calibration.light.chain import LineScan
+from dsl_core.campaign.common.depths import target_range_mm
 from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.campaign.common.same_white import keep_white, require_same_white
 from dsl_core.campaign.common.white_shot import bracket, shoot_white
@@ -40,7 +41,8 @@ FLAT_SHARE = 0.8
 class TargetPictures:
     """Mosaics (lights, rows, columns), DN per ms at full drive, their variance, and where any is saturated.
 
-    ``depth_mm`` (rows, columns) comes from whole projector columns; ``lit`` marks where it means something.
+    ``depth_mm`` (rows, columns) comes from whole projector columns; ``lit`` marks where it means something,
+    ``beyond`` where it is far from all depths of the rig.
     ``dark`` is the mosaic of black after all others, minus that before them, with its variance: None in
     captures without it.
     """
@@ -50,6 +52,7 @@ class TargetPictures:
     saturated: NDArray[np.bool_]
     depth_mm: NDArray[np.float64]
     lit: NDArray[np.bool_]
+    beyond: NDArray[np.bool_]
     dark: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def light_change(self, pixels: NDArray[np.bool_]) -> tuple[float, float] | None:
@@ -70,6 +73,14 @@ class TargetPictures:
 
         Raises `CalibrationError` when there is none.
         """
+        far = self.depth_mm[start & self.beyond]
+        if far.size > (start & self.lit).sum():
+            low, high = rig.depth_range_mm
+            raise CalibrationError(
+                f"The target seems to be {np.median(far):.0f} mm from the camera; this rig is for {low:g} to"
+                f" {high:g} mm (depth_range_mm). Move the target there; if it is there, calibrate the"
+                " geometry again."
+            )
         return fit_plane(rig, self.depth_mm, self.lit if within is None else self.lit & within, start)
 
 
@@ -118,14 +129,17 @@ def read_uniform(source: FrameSource, rig: Rig, progress: Progress) -> TargetPic
     # Captures of earlier versions have no black after the others.
     last = merged.merge("spectral", count) if source.plan.spectral_count > count else None
     lit = white.saturated | (white.radiance > LIT_SIGMAS * np.sqrt(white.variance))
-    low, high = rig.depth_range_mm
+    lit &= ~code.undecided
+    near_mm, far_mm = target_range_mm(rig)
     depth_mm = depth.numpy().reshape(shape)
+    inside = (depth_mm > near_mm) & (depth_mm < far_mm)
     return TargetPictures(
         np.stack([picture.radiance for picture in pictures]).astype(float),
         np.stack([picture.variance for picture in pictures]).astype(float),
         np.any([picture.saturated for picture in pictures], axis=0),
         depth_mm,
-        lit & ~code.undecided & (depth_mm > low) & (depth_mm < high),
+        lit & inside,
+        lit & ~inside,
         None if last is None else (last.radiance.astype(float), last.variance.astype(float)),
     )
 

@@ -9,6 +9,7 @@ import pytest
 from dsl_core.campaign.common.depths import seen_whole_mm
 from dsl_core.campaign.common.recipe import AnyRecipe, Bench
 from dsl_core.campaign.recipes import load_recipe
+from dsl_core.errors import CalibrationError
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import open_twin
 
@@ -32,6 +33,9 @@ def test_flat_targets_stand_within_the_depths_of_their_rig(
         f"about {depth_mm / 10:g} cm" in step.instruction for step in load_recipe(name).steps(bench)[:1]
     )
     assert where(load_recipe(name, {"depth_mm": "655"})) == {655.0}
+    for far_mm in (depth_range_mm[0] / 2, 2 * depth_range_mm[1]):
+        with pytest.raises(CalibrationError, match=rf"depth_mm={far_mm:g} .* for {depth_range_mm[0]:g} to"):
+            load_recipe(name, {"depth_mm": str(far_mm)}).steps(bench)
 
 
 def test_a_chart_stands_farther_away_where_a_narrow_view_shows_all_of_it(tmp_path: Path) -> None:
