@@ -26,7 +26,7 @@ def guess_poses(folders: list[Path], projector_size_px: tuple[int, int]) -> Gues
     """
     guess = guess_mapping(folders[0], projector_size_px)
     if guess.asks:
-        raise StoreError(f"{guess.asks}. State it in a mapping, and give that with --mapping.")
+        raise StoreError(f"{guess.asks}. State it in a mapping.")
     return guess
 
 

@@ -13,12 +13,12 @@ import pytest
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.any_stereo import FoundStereo, load_any_stereo
 
-K = [[1200.0, 0, 640], [0, 1210, 512], [0, 0, 1]]
-P = [[1900.0, 0, 500], [0, 1905, 700], [0, 0, 1]]
+K = np.array([[1200.0, 0, 640], [0, 1210, 512], [0, 0, 1]])
+P = np.array([[1900.0, 0, 500], [0, 1905, 700], [0, 0, 1]])
 R = np.asarray(cv2.Rodrigues(np.array([0.02, 0.3, 0.01]))[0], np.float64)
 T = np.array([-200.0, 10, 40])
-LENSES = {"cam_K": K, "proj_K": P, "image_size": [1280, 1024], "projector_size": [1024, 768]}
-PLAIN = {**LENSES, "R": R.tolist(), "T": T.tolist()}
+LENSES: dict[str, Any] = {"cam_K": K, "proj_K": P, "image_size": [1280, 1024], "projector_size": [1024, 768]}
+PLAIN: dict[str, Any] = {**LENSES, "R": R.tolist(), "T": T.tolist()}
 
 
 def read(tmp_path: Path, parts: dict[str, Any], unit_mm: float = 1.0) -> FoundStereo:
@@ -103,7 +103,7 @@ def test_a_unit_that_is_given_against_the_file_is_refused(tmp_path: Path) -> Non
 def test_four_coefficients_are_no_matrix_of_the_same_name(tmp_path: Path, k1: float) -> None:
     found = read(tmp_path, {"cam_k": [k1, 0.02, 0.001, 0.002], **PLAIN})
     assert found.names["camera matrix"] == "cam_K"
-    assert found.stereo.camera.distortion == (k1, 0.02, 0.001, 0.002, 0)
+    assert found.stereo.camera.distortion == pytest.approx((k1, 0.02, 0.001, 0.002, 0))
     intrinsics = {"cam_k": [k1, 0.02, 0.001, 0.002], **PLAIN, "cam_K": None}
     found = read(tmp_path, {**intrinsics, "cam_intrinsics": [1200, 1210, 640, 512]})
     assert (found.stereo.camera.fx_px, found.stereo.camera.distortion[0]) == (1200, k1)
@@ -157,7 +157,7 @@ def test_all_parts_are_of_the_same_result(tmp_path: Path) -> None:
 
 
 def test_of_two_results_none_is_chosen(tmp_path: Path) -> None:
-    same = {"camera": {"K": K, "intrinsicMatrix": np.transpose(K).tolist(), "kc": [0.1] * 5, "d": [0.1] * 5}}
+    same = {"camera": {"K": K, "intrinsicMatrix": K.T, "kc": [0.1] * 5, "d": [0.1] * 5}}
     assert read(tmp_path, {**PLAIN, "cam_K": None, **same}).stereo.camera.fx_px == 1200
     with pytest.raises(CalibrationError, match=r"two values of one part that differ, a\.cam_K and b\.cam_K"):
         read(tmp_path, {"a": PLAIN, "b": OTHER})
@@ -183,6 +183,6 @@ def test_a_pose_may_have_its_translation_in_the_last_row(tmp_path: Path, name: s
 
 
 def test_another_model_of_lenses_is_found_in_any_encoding(tmp_path: Path) -> None:
-    (tmp_path / "c.json").write_text(json.dumps({**PLAIN, "model": "fisheye"}), encoding="utf-16")
+    (tmp_path / "c.json").write_text('{"model": "fisheye"}', encoding="utf-16")
     with pytest.raises(CalibrationError, match="describes a lens by the model 'fisheye'"):
         load_any_stereo(tmp_path / "c.json")
