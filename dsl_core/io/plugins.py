@@ -3,11 +3,29 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import entry_points
 from typing import TypeVar
 
+from dsl_core.errors import DslError
+
 T = TypeVar("T")
 _log = logging.getLogger(__name__)
+
+
+@contextmanager
+def told_as(what: str, kind: type[DslError]) -> Iterator[None]:
+    """Around code of another package: its mistakes become a ``kind`` of error that says whose they are."""
+    try:
+        yield
+    except DslError:
+        raise
+    except Exception as error:
+        raise kind(
+            f"{what}, which another package added, failed ({type(error).__name__}: {error}). Update that"
+            " package, or remove it."
+        ) from error
 
 
 def load_plugins(group: str, kind: type[T]) -> list[T]:

@@ -11,6 +11,7 @@ Packages add formats by the entry-point group ``dsl_scan.exporters``, whose valu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,7 +26,7 @@ from dsl_core.io.export.mesh.export import export_mesh
 from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import export_png
 from dsl_core.io.export.spectra import export_spectra, named_spectrum
-from dsl_core.io.plugins import load_plugins
+from dsl_core.io.plugins import load_plugins, told_as
 from dsl_core.model.result_order import canonical
 from dsl_core.solve.many import Check, never
 
@@ -86,8 +87,18 @@ def formats() -> dict[str, Format]:
     """All formats by their keys: those of this package, then those of others, which replace none."""
     found = {each.key: each for each in BUILT_IN}
     for each in load_plugins(GROUP, Format):
-        found.setdefault(each.key, each)
+        found.setdefault(each.key.lower(), _guarded(each))
     return found
+
+
+def _guarded(added: Format) -> Format:
+    """A format of another package whose mistakes are told as its own; names are compared without case."""
+
+    def write(result: xr.Dataset, path: Path, *, overwrite: bool = False, check: Check = never) -> list[Path]:
+        with told_as(f"The export format {added.key!r}", StoreError):
+            return [Path(file) for file in added.write(result, path, overwrite=overwrite, check=check)]
+
+    return replace(added, key=added.key.lower(), write=write)
 
 
 def export(

@@ -5,11 +5,13 @@ Packages add some by the entry-point group ``dsl_scan.spectra``, whose values ar
 
 from __future__ import annotations
 
+import logging
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.plugins import load_plugins
+from dsl_core.io.plugins import load_plugins, told_as
 from dsl_core.io.reading import require_plain
 from dsl_core.io.spectra.formats import (
     asd,
@@ -49,12 +51,32 @@ FORMATS: tuple[Format, ...] = (
     columns.FORMAT,
 )
 GROUP = "dsl_scan.spectra"
+_log = logging.getLogger(__name__)
 
 
 @cache
 def formats() -> tuple[Format, ...]:
     """All formats in the order in which they are tried: those of other packages before that for any text."""
-    return (*FORMATS[:-1], *load_plugins(GROUP, Format), FORMATS[-1])
+    return (*FORMATS[:-1], *(_guarded(each) for each in load_plugins(GROUP, Format)), FORMATS[-1])
+
+
+def _guarded(added: Format) -> Format:
+    """A format of another package whose mistakes are told as its own, and keep nobody from other formats."""
+    what = f"The format {added.name!r} of spectra"
+
+    def recognises(path: Path, head: bytes) -> bool:
+        try:
+            with told_as(what, CalibrationError):
+                return added.recognises(path, head)
+        except CalibrationError as error:
+            _log.warning("%s", error)
+            return False
+
+    def read(path: Path) -> list[Spectrum]:
+        with told_as(f"{what}, asked to read {path}", CalibrationError):
+            return added.read(path)
+
+    return replace(added, recognises=recognises, read=read)
 
 
 def suffixes() -> tuple[str, ...]:

@@ -402,18 +402,24 @@ def test_a_package_adds_a_format_and_replaces_none(
         path.write_text("points")
         return [path]
 
+    def silent(result: object, path: Path, *, overwrite: bool = False, check: Check = never) -> list[Path]:
+        return None  # type: ignore[return-value]
+
     offered = [
         added_by_a_package(
             "dsl_scan.exporters", Format("las", ".las", "LAS – points", write, endings=(".laz",))
         ),
         added_by_a_package("dsl_scan.exporters", Format("ply", ".ply", "another PLY", write)),
         added_by_a_package("dsl_scan.exporters", ImportError("no such library")),
+        added_by_a_package("dsl_scan.exporters", Format("Silent", ".silent", "Silent", silent)),
     ]
     with monkeypatch.context() as patch:
         patch.setattr("dsl_core.io.plugins.entry_points", lambda group: offered)
         formats.cache_clear()
         assert export_by_ending(small_result(), tmp_path / "a.laz") == [tmp_path / "a.laz"]
         assert formats()["ply"].about != "another PLY"
+        with pytest.raises(StoreError, match="'Silent', which another package added, failed"):
+            export_by_ending(small_result(), tmp_path / "a.silent")
     formats.cache_clear()
     assert "las" not in formats()
     assert "a package offers mine, which cannot be loaded" in caplog.text

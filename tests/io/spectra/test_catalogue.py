@@ -11,7 +11,7 @@ import pytest
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.catalogue import FORMATS, format_of, formats, read_spectra, suffixes
 from dsl_core.io.spectra.formats.sed import is_sed
-from dsl_core.io.spectra.records import Format
+from dsl_core.io.spectra.records import Format, Spectrum
 from dsl_core.io.spectra.reference_file import read_reference, read_references
 from dsl_core.io.spectra.spectrum_file import read_radiances, read_spectrum
 from tests.cases import spectra_files as made
@@ -48,11 +48,35 @@ def test_a_package_adds_a_format_by_one_entry_point(tmp_path: Path, monkeypatch:
     with monkeypatch.context() as patch:
         patch.setattr("dsl_core.io.plugins.entry_points", lambda group: offered)
         formats.cache_clear()
-        assert format_of(write(tmp_path / "a.txt", b"mine, 1, 2")) is mine
+        assert format_of(write(tmp_path / "a.txt", b"mine, 1, 2")).name == mine.name
         assert ".mine" in suffixes()
         assert formats()[-1] is FORMATS[-1]  # which takes any text
     formats.cache_clear()
     assert formats() == FORMATS
+
+
+def test_a_format_of_another_package_that_fails_keeps_nobody_from_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fails(path: Path) -> list[Spectrum]:
+        raise ValueError("no such block")
+
+    offered = [
+        added_by_a_package("dsl_scan.spectra", each)
+        for each in (
+            Format("Wild", (".wild",), lambda path, head: head.index(b"ZZZ") > 0, fails),
+            Format("Mine", (".mine",), lambda path, head: head.startswith(b"mine"), fails),
+        )
+    ]
+    with monkeypatch.context() as patch:
+        patch.setattr("dsl_core.io.plugins.entry_points", lambda group: offered)
+        formats.cache_clear()
+        text = "nm,leaf\n" + "".join(f"{nm},0.5\n" for nm in range(400, 701, 10))
+        assert len(read_spectra(write(tmp_path / "a.csv", text.encode()))) == 1
+        assert "'Wild' of spectra, which another package added, failed (ValueError" in caplog.text
+        with pytest.raises(CalibrationError, match=r"'Mine' of spectra.*b\.txt, .* failed .*no such block"):
+            read_spectra(write(tmp_path / "b.txt", b"mine, 1, 2"))
+    formats.cache_clear()
 
 
 @pytest.mark.parametrize(
