@@ -18,6 +18,7 @@ from dsl_core.calibration.orders.efficiency import (
     require_both_orders,
     second_order_curve,
     second_order_share,
+    shares_of_sides,
 )
 from dsl_core.calibration.orders.filter_check import (
     NOISE_SIGMAS,
@@ -137,7 +138,9 @@ def fit_bandpass(
     }
     require_both_orders(samples)
     fits = {order: fit_efficiency(order, samples[order]) for order in ORDERS}
-    share, share_std = second_order_share(_second(filters, lights, fits))
+    seconds = shares_of_sides(
+        {order: second_order_share(_second(order, filters, lights, fits[order])) for order in ORDERS}
+    )
     white, white_std = _white(rig, profile_scan(scan), profile)
     target = white_target(rig, reflectance).at(FINE_NM)
     bands = [
@@ -148,16 +151,16 @@ def fit_bandpass(
     through = [through_filter(each.transmission, shift) for each in filters]
     off_nm, off_std_nm = shift_of_all(rig, bands, through, white, white_std, target)
     efficiency = {order: fit.curve for order, fit in fits.items()}
-    if np.isfinite(share_std):
-        for order in ORDERS:
-            efficiency[2 * order] = second_order_curve(fits[order].curve, share, share_std)
+    for order, side in seconds.items():
+        efficiency[2 * order] = second_order_curve(fits[order].curve, *side)
+    shares, stds = np.transpose(list(seconds.values()) or [(0.0, 1.0)])
     return BandpassCalibration(
         filters=tuple(
             _sample(each, place, where) for each, place, where in zip(filters, placed, found, strict=True)
         ),
         efficiency=efficiency,
-        second_order_share=share,
-        second_order_share_std=share_std if np.isfinite(share_std) else 1.0,
+        second_order_share=float(shares.mean()),
+        second_order_share_std=float(np.sqrt(np.mean(stds**2) + shares.var())),
         misfit={order: fit.misfit for order, fit in fits.items()},
         response=refined.response,
         white_scale=refined.white_scale,
@@ -258,17 +261,16 @@ def _ratios(order: int, filters: Sequence[SeenFilter], lights: Sequence[Floats])
 
 
 def _second(
-    filters: Sequence[SeenFilter], lights: Sequence[Floats], fits: dict[int, EfficiencyFit]
+    order: int, filters: Sequence[SeenFilter], lights: Sequence[Floats], fit: EfficiencyFit
 ) -> list[tuple[float, float, float]]:
-    """Second-order ratios with deviation, and what the first order has at the same light."""
+    """Ratios of one side's second order with deviation, and what its first order has at the same light."""
     return [
         (
             float(seen.ratio[c]),
             float(seen.std[c]),
-            float(light[c] @ fits[order].curve.at(FINE_NM) / light[c].sum()),
+            float(light[c] @ fit.curve.at(FINE_NM) / light[c].sum()),
         )
         for each, light in zip(filters, lights, strict=True)
-        for order in ORDERS
         for seen in [each.light.orders[2 * order]]
         for c in range(3)
         if np.isfinite(seen.std[c]) and light[c].sum() > 0

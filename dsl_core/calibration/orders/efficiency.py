@@ -38,6 +38,8 @@ FEW_AMPLITUDE, FEW_LENGTH_NM = 0.2, 75.0
 LEAST_STD = 8e-4
 #: An order stands out from the noise when its ratio is so many deviations above nothing.
 STANDS_OUT = 3.0
+#: Second orders of a film's two sides may differ by this share where only one of them was seen.
+SIDES_STD = 0.2
 
 
 @dataclass(frozen=True)
@@ -144,6 +146,21 @@ def second_order_share(
     mean = float((weight * share).sum() / weight.sum())
     chi = float((weight * (share - mean) ** 2).sum()) / max(len(used) - 1, 1)
     return max(mean, 0.0), float(np.sqrt(max(chi, 1.0) / weight.sum()))
+
+
+def shares_of_sides(seen: Mapping[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
+    """Both `second_order_share` with deviations by first order, +1 and -1; none where neither side shows any.
+
+    A film need not send as much to one side as to the other; of a side that shows none, the other says most.
+    """
+    found = {}
+    for order, (share, std) in seen.items():
+        other, other_std = seen[-order]
+        if np.isfinite(std):
+            found[order] = share, std
+        elif np.isfinite(other_std):
+            found[order] = other, float(np.hypot(other_std, SIDES_STD * other))
+    return found
 
 
 def second_order_curve(first: SpectralCurve, share: float, share_std: float) -> SpectralCurve:

@@ -41,7 +41,9 @@ class BandpassCalibration(Record):
     """Efficiency by order relative to the zero order, response, white scale, blur and halo, with deviations.
 
     The response keeps the scale that green had before; ``white_scale`` belongs to it. ``misfit`` is the
-    factor by which the scatter of the efficiency exceeds its stated deviations, by order. Where the lines
+    factor by which the scatter of the efficiency exceeds its stated deviations, by order.
+    ``second_order_share`` is the mean of what both second orders have of the light of their first ones, with
+    the deviation of either from it; ``efficiency`` has each for itself. Where the lines
     call for another curve than a Gaussian, ``spread`` is that curve, of the rms width ``blur_px``, and where
     its width varies over the projector's frame, ``field`` says how. ``filters_off_nm`` is by how much longer
     wavelengths than stated all filters pass, judged by the LEDs' spectra, with its deviation, None where it

@@ -13,6 +13,7 @@ from dsl_core.calibration.orders.efficiency import (
     require_both_orders,
     second_order_curve,
     second_order_share,
+    shares_of_sides,
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.spectral import SpectralCurve
@@ -117,6 +118,15 @@ def test_the_deviation_of_the_second_order_is_that_of_a_weighted_mean() -> None:
     assert chi > 5
     assert share_std == pytest.approx(np.sqrt(chi / weight.sum()))
     assert second_order_share([(0.004, 2e-4, 0.1)] * 4) == pytest.approx((0.04, 1e-3))
+
+
+def test_a_side_without_second_orders_has_about_those_of_the_other() -> None:
+    none = 0.0, np.inf
+    assert shares_of_sides({1: (0.03, 0.001), -1: (0.05, 0.002)}) == {1: (0.03, 0.001), -1: (0.05, 0.002)}
+    assert shares_of_sides({1: none, -1: none}) == {}
+    found = shares_of_sides({1: (0.04, 0.001), -1: none})
+    assert found[1] == (0.04, 0.001)
+    assert found[-1] == pytest.approx((0.04, np.hypot(0.001, 0.008)))
 
 
 def test_deviations_of_the_second_order_cover_the_share() -> None:
