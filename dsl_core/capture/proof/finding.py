@@ -26,6 +26,7 @@ class Verdict(StrEnum):
     DISPLACED = "displaced"
     HIDDEN = "partly hidden"
     COLOURS = "other colours"
+    PASSING = "passing light"
     ROWS_TWICE = "rows twice"
     OTHER = "another picture"
 
@@ -50,9 +51,11 @@ _SEEN = {
     Verdict.DISPLACED: "it is displaced from the pictures before",
     Verdict.HIDDEN: "a part of it is darker than the black picture, as if something were before it",
     Verdict.COLOURS: "some of its colours are darker than in the black picture, and others are not",
+    Verdict.PASSING: "a part of it has other light than in the lines before and after",
     Verdict.ROWS_TWICE: "some of its rows come twice",
     Verdict.OTHER: "it shows something else",
 }
+_KEEP_OUT = "Keep out of the way of camera, projector and lamps, and keep the light of the room as it was."
 _REMEDY = {
     Verdict.LATE: "Let the projector settle for longer (its latency), and check that it follows.",
     Verdict.REPEATED: "Restart the camera.",
@@ -66,8 +69,8 @@ _REMEDY = {
     " switch mirroring off in the settings of both, or calibrate again.",
     Verdict.DISPLACED: "Check that projector, camera and target have not moved since the scan began,"
     " and that the projector does not correct or scale its picture.",
-    Verdict.HIDDEN: "Keep out of the way of camera, projector and lamps, and keep the light of the room as"
-    " it was.",
+    Verdict.HIDDEN: _KEEP_OUT,
+    Verdict.PASSING: _KEEP_OUT,
     Verdict.COLOURS: "Switch automatic white balance of the camera off, and look whether the light of the"
     " room has changed its colour.",
     Verdict.ROWS_TWICE: "Packets of the camera's link are lost or sent again: check its cable, its network"

@@ -16,6 +16,7 @@ from dsl_core.capture.proof.late_colour import late_colour
 from dsl_core.capture.proof.lines.bright_black import BrightBlack
 from dsl_core.capture.proof.lines.hidden import HiddenParts
 from dsl_core.capture.proof.lines.neighbours import LineNeighbours
+from dsl_core.capture.proof.lines.passing_light import PassingLight
 from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.row_copies import has_row_copies
 from dsl_core.capture.proof.scene_check import SceneCheck
@@ -60,6 +61,9 @@ class FrameProof:
         self._sentinels = SentinelProof(known.noise, known.raster, self._channels)
         self._bright_black = BrightBlack(known.noise)
         self._hidden = HiddenParts(known.noise)
+        self._passing = PassingLight(known)
+        #: What the last picture said of lines before it that seem to have had light of their own.
+        self.passed: Finding | None = None
         self._neighbours = LineNeighbours(known.noise, known.raster.shape[1])
         self._last: tuple[Shot, Counts] | None = None
         #: The picture that came for two patterns, for as long as it comes.
@@ -80,6 +84,8 @@ class FrameProof:
             wrong = self._unless_black_is_bright(found, seen) or self._unless_hidden(found, seen)
             # A doubt asks for a second picture.
             found = wrong or (found if self._known.at_the_end else self._with_doubt(found, seen))
+        is_line = shot.role == "spectral" and not found.is_wrong
+        self.passed = self._passing.judge(shot, seen) if is_line else None
         self._last = (shot, seen)
         self._known.remember(shot, seen, found.again, found.verdict is Verdict.RIGHT)
         return found
@@ -100,6 +106,10 @@ class FrameProof:
             return ""
         seen, wanted = known.raster.take(one), known.raster.take(other)
         return late_colour(seen, wanted, before, black, known.raster.channels(known.bayer), known.noise)
+
+    def is_past(self, pixels: NDArray[np.uint16]) -> bool:
+        """Whether the first of the lines `passed`, whose raw mosaic this is, has that light no longer."""
+        return self._passing.is_past(self._known.raster.take(pixels))
 
     def is_alone(self, found: Finding) -> bool:
         """Whether nothing tells a line: neither its columns, which are not seen, nor lines before it."""

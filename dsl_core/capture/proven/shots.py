@@ -161,6 +161,9 @@ class ProvenShots:
             self._doubted.trust_untold()
         if found.verdict is Verdict.LATE or found.colour:
             self._lateness.count_late(found)
+        passed = self._proof.passed
+        if passed is not None and self._proof.is_past(self._again(passed.again[0]).pixels):
+            self._correct(passed, self._proof)
         self._correct(found, self._proof)
         if self._is_late:
             return

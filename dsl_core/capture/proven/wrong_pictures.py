@@ -13,6 +13,8 @@ DIM = (Verdict.DARK, Verdict.EXPOSURE)
 #: Pictures that are wrong like this, though nothing has changed that anybody could name, may have become so
 #: slowly: nobody knows since when.
 CREEPING = (Verdict.EXPOSURE, Verdict.OTHER, Verdict.DISPLACED)
+#: Somebody in the way, or a lamp, is seen at once.
+PASSING = (Verdict.HIDDEN, Verdict.PASSING)
 _DIMMED = (
     "White, black and a frame of the code, captured once more, look as they did: the projector may give dark"
     " pictures less light than bright ones. Switch its dynamic contrast, iris and eco mode off, and check"
@@ -57,7 +59,7 @@ def what_to_do(found: Finding, change: Explanation, proof: FrameProof, is_steady
 
     A pair of the code ``is_steady`` that looks the same whenever it is captured again.
     """
-    if found.verdict is Verdict.HIDDEN and not change.is_of_all:
+    if found.verdict in PASSING and not change.is_of_all:
         # Who stands there is in the pictures that would say what has changed, too.
         return found.remedy
     if change.is_as_at_first:
@@ -77,12 +79,11 @@ def what_to_do(found: Finding, change: Explanation, proof: FrameProof, is_steady
 def has_begun_before(found: Finding, change: Explanation) -> bool:
     """Whether pictures before one that stays wrong may be spoiled as well, and nobody knows since when.
 
-    What has changed in white, black and code since the scan began is in some of them. Who stands in the light
-    is seen at once.
+    What has changed in white, black and code since the scan began is in some of them.
     """
     if change.has_moved:
         return True
-    return found.verdict is not Verdict.HIDDEN if change.sentence else found.verdict in CREEPING
+    return found.verdict not in PASSING if change.sentence else found.verdict in CREEPING
 
 
 def why_control_differs(is_mirrored: bool) -> str:

@@ -61,6 +61,8 @@ class Bench:
         self.of_code: CodeSum | None = None
         self.of_ends: list[str] = []
         self.is_steady = False
+        self.passed: Finding | None = None
+        self.has_gone = False
         self.scene = self.whole = self
         parts: Any = self
         self.shots = ProvenShots(parts, parts, parts, parts, self.token)
@@ -117,6 +119,9 @@ class Bench:
 
     def keep(self, shot: Shot, pixels: object) -> None:
         self.kept.append(shot.index)
+
+    def is_past(self, pixels: object) -> bool:
+        return self.has_gone
 
     def late_colour(self, shot: Shot, one: object, other: object) -> str:
         return self.colour
@@ -385,6 +390,18 @@ def test_nobody_hides_a_part_of_a_picture_of_which_all_has_changed() -> None:
         PictureError, match=r"darker than the black picture.*\. Turned\. Then resume the scan\. Frames before"
     ):
         bench.shots.take(LINE)
+
+
+@pytest.mark.parametrize("has_gone", [True, False])
+def test_lines_are_taken_again_only_if_their_light_has_passed(has_gone: bool) -> None:
+    bench = Bench(is_right)
+    before = SHOTS[LINE.index - 1]
+    bench.passed, bench.has_gone = Finding(LINE, Verdict.PASSING, (before,)), has_gone
+    bench.shots.take(LINE)
+    asked = [index for index, *_ in bench.taken]
+    assert asked == [LINE.index, before.index, *[before.index] * has_gone]
+    assert bench.shots.corrected == has_gone
+    assert ("other light than in the lines before" in bench.written.get(before.index, "")) == has_gone
 
 
 def test_nothing_is_taken_again_after_a_cancel() -> None:
