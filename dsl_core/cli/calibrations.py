@@ -15,6 +15,7 @@ from dsl_core.cli.options import (
     OverrideCalibration,
     RigName,
     RigOptions,
+    html_page,
     parse_options,
     tab_calibrations,
 )
@@ -55,7 +56,10 @@ def list_(json: Json = False) -> None:
 @calibrations.command()
 def show(
     name: Name,
-    report: Annotated[Path | None, typer.Option("--report", "-o", help="Also write this HTML page.")] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", "-o", callback=html_page, help="Also write this HTML page."),
+    ] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from dsl_core.errors import DeviceError, PlanError
+from dsl_core.errors import DeviceError, PlanError, StoreError
 
 if TYPE_CHECKING:
     from dsl_core.model.plan import CapturePlan, SpectralSet
@@ -53,9 +53,23 @@ def tab_plans(incomplete: str) -> list[str]:
     return [preset.key for preset in PRESETS if preset.key.startswith(incomplete)]
 
 
+def html_page(path: Path | None) -> Path | None:
+    """The name of a page; raises `StoreError` for one that ends as another kind of file does."""
+    from mimetypes import guess_type
+
+    if path is not None and guess_type(path.name)[0] not in (None, "text/html"):
+        raise StoreError(
+            f"{path.name} is to be an HTML page, and its name ends in {path.suffix}. End it in .html."
+        )
+    return path
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
-Report = Annotated[Path | None, typer.Option("--report", "-o", help="Also write everything as an HTML page.")]
+Report = Annotated[
+    Path | None,
+    typer.Option("--report", "-o", callback=html_page, help="Also write everything as an HTML page."),
+]
 RigName = Annotated[
     str,
     typer.Option("--rig", help="Name of a rig; 'dsl-scan rigs' lists them.", autocompletion=tab_rigs),

@@ -12,6 +12,7 @@ from dsl_core.cli.options import (
     Force,
     Json,
     RigOptions,
+    html_page,
     parse_options,
     parse_pixels,
     tab_rigs,
@@ -38,7 +39,10 @@ def evaluate(
     ] = None,
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     report: Annotated[
-        Path | None, typer.Option("--report", "-o", help="HTML page to write; the default is RESULT.html.")
+        Path | None,
+        typer.Option(
+            "--report", "-o", callback=html_page, help="HTML page to write; the default is RESULT.html."
+        ),
     ] = None,
     force: Force = False,
     json: Json = False,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.options import CalibrationName, Force, Json, RigName, RigOptions, parse_options
+from dsl_core.cli.options import CalibrationName, Force, Json, RigName, RigOptions, html_page, parse_options
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, PlanError
 from dsl_core.io.staging import check_targets
@@ -35,7 +35,10 @@ def tradeoff(
         Path | None, typer.Option("--look", help="Result of a quick scan of the scene to plan for.")
     ] = None,
     plan: Annotated[Path | None, typer.Option("--plan", help="Write the chosen plan to this file.")] = None,
-    report: Annotated[Path | None, typer.Option("--report", help="Write all plans as an HTML page.")] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", callback=html_page, help="Write all plans as an HTML page."),
+    ] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:

@@ -378,3 +378,20 @@ def test_a_full_disk_while_the_result_is_saved(
     assert ending.code == 2
     assert "disk is full" in ending.sentence
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["batch", ".", "--report", "r.pdf"],
+        ["evaluate", "a.zarr", "-o", "r.csv"],
+        ["tradeoff", "--budget", "60s", "--report", "r.json"],
+        ["calibrations", "show", "twin", "-o", "r.png"],
+    ],
+)
+def test_a_page_is_not_written_under_the_ending_of_another_kind_of_file(
+    give: Give, command: list[str]
+) -> None:
+    ending = give(*command)
+    assert ending.code == 2
+    assert ending.sentence.startswith(f"{command[-1]} is to be an HTML page")
