@@ -20,7 +20,7 @@ OVER, SIGMAS = 0.03, 5.0
 #: many pairs. Clean scans have one in ten thousand.
 SHARE, FEWEST, TIMES, FEWEST_PAIRS = 0.005, 8, 4.0, 3
 #: A pixel is on the bright side of an edge if the other picture of its pair gives it less than the first
-#: share of white, and more than the second to one so near in its row, px.
+#: share of white, and more than the second to one so near in its row or column, px of the raster's rows.
 DARK, BRIGHT, NEAR_PX = 0.1, 0.5, 3
 SENTENCE = (
     "Edges of the code's stripes are brighter than white: camera or projector sharpens its picture. Switch"
@@ -48,7 +48,7 @@ def sharp_edges(pairs: Mapping[int, Pair], ends: tuple[Counts, Counts], noise: N
         beside, elsewhere = np.zeros(2), np.zeros(2)
         for seen, inverse in ((one, other), (other, one)):
             dark = lit & (inverse < DARK * light)
-            near = _near((inverse > BRIGHT * light).reshape(raster.shape)).ravel()
+            near = _near((inverse > BRIGHT * light).reshape(raster.shape), raster.rows_px).ravel()
             is_over = seen > usual + limit
             for counts, at in ((beside, dark & near), (elsewhere, dark & ~near)):
                 counts += (at & is_over).sum(), at.sum()
@@ -57,10 +57,11 @@ def sharp_edges(pairs: Mapping[int, Pair], ends: tuple[Counts, Counts], noise: N
     return SENTENCE if found >= FEWEST_PAIRS else ""
 
 
-def _near(bright: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Pixels (rows, columns) within `NEAR_PX` of bright ones in their row."""
+def _near(bright: NDArray[np.bool_], rows_px: float) -> NDArray[np.bool_]:
+    """Pixels (rows, columns) within `NEAR_PX` of bright ones in their row, or column of rows so far apart."""
     near = bright.copy()
-    for step in range(1, NEAR_PX + 1):
-        near[:, step:] |= bright[:, :-step]
-        near[:, :-step] |= bright[:, step:]
+    for each, seen, step_px in ((near, bright, 1.0), (near.T, bright.T, rows_px)):
+        for step in range(1, int(NEAR_PX / step_px) + 1):
+            each[:, step:] |= seen[:, :-step]
+            each[:, :-step] |= seen[:, step:]
     return near

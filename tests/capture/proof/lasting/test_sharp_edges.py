@@ -20,13 +20,15 @@ SHALLOW = Sensor(bit_depth=8, black_level_dn=4, electrons_per_dn=40, read_noise_
 
 
 def said_of(
-    sensor: Sensor, sharpened: float, *, code_light: float = 1.0, shaded: float = 1.0, orders: float = 0.0
-) -> str:
+    sensor: Sensor, sharpened: float, *, code_light: float = 1.0, shaded: float = 1.0, orders: float = 0.0,
+    is_portrait: bool = False,
+) -> str:  # fmt: skip
     """Of a camera that sharpens by so much, where the code has other light than white.
 
     A quarter of white was ``shaded``; the film displaces a share of all light by some ``orders``.
     """
-    raster, rng = Raster((SIZE[0], ROWS)), np.random.default_rng(3)
+    raster = Raster((ROWS, SIZE[0]) if is_portrait else (SIZE[0], ROWS))
+    rng = np.random.default_rng(3)
     surface = 0.5 * sensor.full_scale_dn * rng.uniform(0.6, 1.0, (ROWS, SIZE[0]))
 
     def seen(light: np.ndarray) -> Counts:
@@ -36,7 +38,8 @@ def said_of(
         counts += rng.normal(0, np.sqrt(sensor.read_noise_dn**2 + counts / sensor.electrons_per_dn))
         counts += sharpened * (counts - gaussian_filter1d(counts, 1.5, axis=1, mode="nearest"))
         counts = np.rint(sensor.black_level_dn + counts).clip(0, sensor.full_scale_dn)
-        return raster.take(counts.astype(np.uint16))
+        taken = counts.astype(np.uint16)
+        return raster.take(taken.T if is_portrait else taken)
 
     pairs = {}
     for number in range(7):
@@ -53,6 +56,12 @@ def said_of(
 def test_edges_brighter_than_white_are_sharpened(sensor: Sensor, sharpened: float) -> None:
     assert "sharpens its picture" in said_of(sensor, sharpened)
     assert "sharpens its picture" in said_of(sensor, 2 * sharpened, code_light=0.8)
+
+
+@pytest.mark.parametrize("sensor", [DEEP, SHALLOW])
+def test_edges_of_a_camera_in_portrait_are_looked_at_down_its_picture(sensor: Sensor) -> None:
+    assert "sharpens its picture" in said_of(sensor, 0.5, is_portrait=True)
+    assert said_of(sensor, 0.0, is_portrait=True) == said_of(sensor, 0.0, orders=0.1, is_portrait=True) == ""
 
 
 @pytest.mark.parametrize("sensor", [DEEP, SHALLOW])
