@@ -50,12 +50,15 @@ class ExposureWatch:
 
     def add(self, shot: Shot, pixels: NDArray[np.unsignedinteger]) -> None:
         """Look at a frame (rows, columns), DN."""
+        if not self._waits_for or shot.role not in ("white", "code"):
+            return
+        # White may saturate all over, so that nothing in it tells where values end; stripes are dark, too.
+        channels = bayer_channels(self._bayer, *pixels.shape)
+        self._full_scale_dn = end_near_full(pixels, self._full_scale_dn, channels)
         if shot.index not in self._waits_for:
             return
         self._waits_for.discard(shot.index)
         # One colour is enough to tell a code and to find a line.
-        channels = bayer_channels(self._bayer, *pixels.shape)
-        self._full_scale_dn = end_near_full(pixels, self._full_scale_dn, channels)
         saturated = by_colour(pixels).min(axis=0) >= self._full_scale_dn
         self._always = saturated if self._always is None else self._always & saturated
         share = float(self._always.mean())

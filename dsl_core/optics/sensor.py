@@ -24,8 +24,9 @@ ABOVE = 0.01
 OTHER_COLOUR = 0.1
 #: Cameras as they are end above this share of their bit depth's range; below it, something cuts them off.
 NEAR_FULL = 0.9
-#: Of one colour, those below this share are ends only where there is also light just below them.
-NEARLY_FULL = 0.98
+#: Of one colour, those below this share are ends only where there is also light just below them, or noise,
+#: which grows with the light, in pixels darker than a share of it: so many of them stand out in their row.
+NEARLY_FULL, DARK, NOISY = 0.98, 0.1, 0.1
 
 
 def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.int64]:
@@ -116,7 +117,15 @@ def end_near_full(
     far = max(end // 100, 8)
     just_below = (pixels >= end - far) & (pixels <= end - far // 2)
     is_end = end >= NEARLY_FULL * full_scale_dn or np.count_nonzero(just_below) >= SEEN
-    return end if is_end else full_scale_dn
+    return end if is_end or (pixels.max() == end and _is_noisy(pixels, DARK * end)) else full_scale_dn
+
+
+def _is_noisy(pixels: NDArray[np.unsignedinteger], below_dn: float) -> bool:
+    """Whether pixels darker than ``below_dn`` are brighter, or darker, than both neighbours in their row."""
+    flat = pixels.ravel().astype(np.int64)
+    triples = np.lib.stride_tricks.sliding_window_view(flat, 3)
+    left, middle, right = triples[triples.max(axis=1) < below_dn].T
+    return middle.size >= PILE and float(np.mean((middle - left) * (middle - right) > 0)) > NOISY
 
 
 def digitise(

@@ -83,6 +83,36 @@ def test_white_of_one_colour_that_ends_below_full_scale_is_saturated_there(
     assert told in watch.found
 
 
+@pytest.mark.parametrize(("full_dn", "noise_dn"), [(255, 0.5), (4095, 3.0)])
+@pytest.mark.parametrize(("times", "told"), [(1.5, "80%"), (8.0, "80%"), (0.98, "")])
+def test_white_of_one_colour_that_is_far_too_bright_is_saturated_where_its_values_end(
+    times: float, told: str, full_dn: int, noise_dn: float
+) -> None:
+    """Nothing is just below the end, as its surroundings are dark."""
+    watch, end_dn = ExposureWatch(PLAN, full_dn, "MONO"), round(0.95 * full_dn)
+    light = np.full((60, 90), times * end_dn)
+    light[:, :18] = 0.02 * full_dn
+    light += np.random.default_rng(0).normal(0, noise_dn, light.shape)
+    for shot in PLAN.shots():
+        watch.add(shot, np.rint(np.clip(light, 0, end_dn)).astype(np.uint16))
+    assert (told in watch.found) if told else watch.found == ""
+
+
+@pytest.mark.parametrize(("noise_dn", "told"), [(2.0, "100%"), (0.0, "")])
+def test_where_white_is_saturated_all_over_stripes_of_the_code_tell_that_values_end(
+    noise_dn: float, told: str
+) -> None:
+    """Their dark halves have noise, which bright light has as well unless values end there."""
+    watch, rng = ExposureWatch(PLAN, 4095, "MONO"), np.random.default_rng(0)
+    for shot in PLAN.shots():
+        light = np.full((60, 90), 3900.0 if shot.role in ("white", "code") else 80.0)
+        if shot.role == "code":
+            light[:, :45] = np.linspace(80.0, 120.0, 45)
+        light += np.where(light < 3900, rng.normal(0, noise_dn, light.shape), 0)
+        watch.add(shot, np.rint(light).astype(np.uint16))
+    assert (told in watch.found) if told else watch.found == ""
+
+
 def test_white_that_ends_below_full_scale_is_saturated_there() -> None:
     watch, pixels = ExposureWatch(PLAN, FULL_DN, "RGGB"), white(1.0) - 3
     for shot in PLAN.shots():
