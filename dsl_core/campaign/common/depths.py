@@ -26,7 +26,7 @@ def target_depth_mm(rig: Rig, wanted_mm: float | None) -> float:
     if not near < wanted_mm < far:
         low, high = rig.depth_range_mm
         raise CalibrationError(
-            f"A target at depth_mm={wanted_mm:g} was asked for; this rig is for {low:g} to {high:g} mm."
+            f"A target was requested at depth_mm={wanted_mm:g}; this rig is for {low:g} to {high:g} mm."
             " Choose a distance in between, or state another depth_range_mm in the rig's nominal figures."
         )
     return wanted_mm

@@ -96,7 +96,7 @@ def _check_pixels(result: xr.Dataset, pixels: Sequence[Pixel]) -> None:
         )
     if any(axis in result.coords and lie_between_pixels(result[axis].values) for axis in ("x", "y")):
         raise StoreError(
-            "The pixels of this result are averages over several, whose coordinates are no whole"
+            "The pixels of this result are averages over several, whose coordinates are not whole"
             " numbers, so x,y names none of them. Export spectra of places instead, such as by"
             " 'dsl-scan spectra --at'."
         )
