@@ -33,7 +33,6 @@ PHRASES = (
         "it is a scan; open and reconstruct it first",
     ),
     (", such as by 'dsl-scan spectra --at'.", "."),
-    (", and give that with --mapping.", "."),
     ("or export the columns with 'dsl-scan export'.", "or export the columns."),
     ("For a published dataset use 'dsl-scan import'.", "For a published dataset use File, Import."),
     ("; they give the camera's lens (--camera-only).", "."),
