@@ -32,8 +32,9 @@ LEVEL_DN = 2.0
 #: A pixel is lit in black if it has more than this share of usual white, more than so many times what white
 #: adds to it, and so many deviations; white is what it is where it adds as many to black.
 AS_WHITE, TIMES, SEEN_SIGMAS = 0.5, 2.0, 6.0
-#: Where more of the pixels that white lights are lit in black, as a share, the room lights the scene.
-MOST_LIT = 0.5
+#: Where more of the pixels that white lights are lit in black, as a share, the room lights the scene; where
+#: more than a few pixels, as a share, are so lit in more of the blocks that white lights, it does so, too.
+MOST_LIT, FEW_LIT = 0.5, 0.05
 #: So many such pixels that have a neighbour among them: hot pixels of a sensor are alone.
 FEWEST_LIT = 5
 
@@ -161,20 +162,28 @@ def lit_black(
     rows = raster.rows[down]
     in_rows = near.mean(1) > 0
     is_in_stripes = _alternate(near, raster.rows) and float(in_rows.mean()) > 0.2
+    in_blocks = raster.pool(lit.astype(np.float32)) > FEW_LIT
+    white_blocks = raster.pool(is_bright.astype(np.float32)) > 0
+    if not is_in_stripes and white_blocks.any() and in_blocks[white_blocks].mean() > MOST_LIT:
+        return None
     step = size_px[0] / raster.shape[1]
     columns = int(across.min() * step), int((across.max() + 1) * step)
     return LitBlack(int(lit.sum()), columns, (int(rows.min()), int(rows.max()) + 1), is_in_stripes)
 
 
-def room_light(white: Counts, black: Counts, level: float, noise: Noise) -> str:
-    """That the room lights most of the scene more than white of a ``level``; empty where it does not."""
+def room_light(white: Counts, black: Counts, level: float, noise: Noise, *, is_highest: bool = True) -> str:
+    """That the room lights most of the scene more than white of a ``level``; empty where it does not.
+
+    Levels of other settings are no higher if it ``is_highest``.
+    """
     gain, rest, is_bright = _light(white, black, noise)
     if not _room(gain, rest, is_bright):
         return ""
     times = float(np.median(rest[is_bright] / gain[is_bright]))
+    advice = ", or use settings of a higher level" if is_highest else ""
     return (
         f"The room gives {times:.2g} times the light of the projector's white at a level of {level:g}:"
-        " its noise is in every picture. Darken the room, or use settings of a higher level."
+        f" its noise is in every picture of that level. Darken the room{advice}."
     )
 
 

@@ -32,7 +32,8 @@ def sentences_of_ends(
     if lit is not None:
         return [lit.sentence]  # the rest would be judged by what is in the picture
     level = plan.settings[setting].level
-    room = room_light(white, black, level, noise)
+    is_highest = level == max(each.level for each in plan.settings)
+    room = room_light(white, black, level, noise, is_highest=is_highest)
     if rig is None or room:
         return [room] if room else []  # room light is not told from the projector's
     glow = black_light(white, black, level, rig.projector_response, channels, noise, raster)

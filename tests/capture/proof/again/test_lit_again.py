@@ -44,3 +44,14 @@ def test_pictures_without_one_and_faint_light_of_the_room_are_no_window(light_dn
 
 def test_what_was_there_from_the_first_picture_on_did_not_come_in() -> None:
     assert found(window(1.3 * WHITE_DN), at_first=True) is None
+
+
+def test_where_white_alone_has_lost_light_black_has_not_become_bright() -> None:
+    lit = window(0.8 * WHITE_DN)
+
+    def light_of(is_white: bool, is_later: bool) -> NDArray[np.float64]:
+        gain = np.where(lit > 0, 0.1 if is_later else 0.6, 1.0) * WHITE_DN
+        return lit + (gain if is_white else 0.0)
+
+    channels, noise = RASTER.channels("RGGB"), Noise.of(Sensor(), 12)
+    assert lit_again(PLAN, rasters(light_of, WHITES[0]), channels, noise, RASTER) is None

@@ -50,10 +50,14 @@ def test_a_pointer_beside_it_is_told_with_its_place(pointer_dn: float, sensor: S
 
 
 @pytest.mark.parametrize("sensor", [CALIBRATED, None])
-@pytest.mark.parametrize(("room", "told"), [(0.01, ""), (1.0, ""), (8.0, "gives 8 times the light")])
+@pytest.mark.parametrize(
+    ("room", "told"), [(0.01, ""), (1.0, ""), (1.9, ""), (8.0, "gives 8 times the light")]
+)
 def test_a_bright_room_is_no_pointer(room: float, told: str, sensor: Sensor | None) -> None:
     white, black = taken_of(300.0, room=room)
     noise = Noise.of(sensor, 12)
     assert lit_black(white, black, RASTER.channels("RGGB"), noise, RASTER, SIZE) is None
     said = room_light(white, black, 0.2, noise)
     assert (told in said) if told else not said
+    lower = room_light(white, black, 0.2, noise, is_highest=False)
+    assert lower == said.replace(", or use settings of a higher level", "")
