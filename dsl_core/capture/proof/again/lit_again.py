@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.lasting.black_light import FEWEST_LIT, SEEN_SIGMAS, LitBlack, lit_black
+from dsl_core.capture.proof.lasting.black_light import SEEN_SIGMAS, LitBlack, lit_black
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Raster
 from dsl_core.capture.proof.white_again import repeats
@@ -47,11 +47,10 @@ def lit_again(
     """
     size_px = plan.camera_size_px
     for shot, before, now in repeats(plan, kept):
-        found = lit_black(*now, channels, noise, raster, size_px)
         variance = noise.variance(before[1]) + noise.variance(now[1])
         gained = now[1].astype(np.float32) - before[1] > SEEN_SIGMAS * np.sqrt(variance)
-        if found is None or int(gained.sum()) < FEWEST_LIT:
-            continue
-        if lit_black(*before, channels, noise, raster, size_px) is None:
+        came = np.where(gained, now[1], now[1].min())
+        found = lit_black(now[0], came, channels, noise, raster, size_px)
+        if found is not None and lit_black(*before, channels, noise, raster, size_px) is None:
             return LitAgain(shot, found)
     return None
