@@ -18,10 +18,11 @@ from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share
 from dsl_core.reconstruction.findings.known_causes import (
     with_finer_bands_first,
     without_drift_that_is_none,
-    without_misfit_of_wide_bands,
+    without_effects,
 )
 from dsl_core.reconstruction.findings.line_edges import edge_findings
 from dsl_core.reconstruction.findings.model_findings import MOVED, cause_findings
+from dsl_core.reconstruction.spectral.colour_sites import MOSAIC
 from dsl_core.reconstruction.spectral.film_motion import orders_off_px
 from dsl_core.reconstruction.spectral.model_error import ModelError
 from dsl_core.reconstruction.spectral.self_correction import Followed
@@ -50,13 +51,14 @@ def fit_of(
     width_nm = line_width_nm(rig, plan, grid, depth_mm)
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra)
-    if followed is not None:
+    is_coloured = all(each.name != MOSAIC or not each.significant for each in findings)
+    if followed is not None and is_coloured:
         off_px = orders_off_px(rig)
         of_model = cause_findings(followed.probe, followed.balanced, followed.motion, off_px, followed.turn)
         findings += without_drift_that_is_none(of_model, [*findings])
     turn = None if followed is None else followed.turn
     common = [rig.white_scale_rel_std, rig.reference_rel_std, 0.0 if turn is None else turn.level_rel_std]
-    findings = with_finer_bands_first(without_misfit_of_wide_bands(findings), grid.step_nm)
+    findings = with_finer_bands_first(without_effects(findings), grid.step_nm)
     fit = Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
     fit = fit.model_copy(update={"common_rel_std": float(np.linalg.norm(common))})
     if followed is None or not followed.has_changed:

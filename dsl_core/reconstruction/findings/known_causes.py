@@ -17,12 +17,15 @@ from dsl_core.reconstruction.findings.model_findings import (
     ORDERS_APART,
 )
 from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
+from dsl_core.reconstruction.spectral.colour_sites import MOSAIC
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
 #: What may be left of a drift in frames that follow the light: so much, and so many deviations of it.
 MOST_LEFT, SIGMAS = 0.05, 4.5
 #: What bands that are too wide for the lines look like: straight pieces follow no spectrum then.
 BY_WIDE_BANDS = frozenset({POOR_AREAS, POOR_FIT, COLOUR_GAINS, COLOURS_DISAGREE, MISFIT})
+#: What else follows from each cause; where pixels have other colours than stated, the model says nothing.
+EFFECTS = {WIDE_BANDS: BY_WIDE_BANDS, MOSAIC: BY_WIDE_BANDS | {BALANCE}}
 
 
 def with_known_causes(findings: Iterable[FitFinding]) -> list[FitFinding]:
@@ -48,18 +51,15 @@ def _by_black(finding: FitFinding) -> FitFinding:
     )
 
 
-def without_misfit_of_wide_bands(findings: Iterable[FitFinding]) -> list[FitFinding]:
-    """The same findings, where bands too wide for the lines are told and may be all that does not fit.
+def without_effects(findings: Iterable[FitFinding]) -> list[FitFinding]:
+    """The same findings, where bands too wide for the lines, or a wrong mosaic, may be all that does not fit.
 
-    Nobody should look for a fault of the camera, the film or the surface before bands are narrower.
+    Nobody should look for a fault of the film or the surface before that is mended.
     """
     found = list(findings)
-    if not any(each.significant and each.name == WIDE_BANDS for each in found):
-        return found
-    return [
-        each.model_copy(update={"significant": False}) if each.name in BY_WIDE_BANDS else each
-        for each in found
-    ]
+    causes = {each.name for each in found if each.significant}
+    hidden = frozenset[str]().union(*(names for cause, names in EFFECTS.items() if cause in causes))
+    return [each.model_copy(update={"significant": False}) if each.name in hidden else each for each in found]
 
 
 def with_finer_bands_first(findings: Iterable[FitFinding], step_nm: float) -> list[FitFinding]:

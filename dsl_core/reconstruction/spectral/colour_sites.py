@@ -25,6 +25,8 @@ FEWEST, SIGMAS = 20, 20.0
 WRONG_NM, RIGHT_SHARE = 15.0, 0.5
 #: A share of pixels with another colour from which on nothing of a result is right.
 LIMIT = 0.01
+#: Name of what is found of them.
+MOSAIC = "colours of the camera's pixels"
 
 
 def colour_sites_finding(rig: Rig, seen: FirstOrderLight) -> FitFinding | None:
@@ -50,12 +52,13 @@ def colour_sites_finding(rig: Rig, seen: FirstOrderLight) -> FitFinding | None:
     other = np.mean(np.array(colour_sites(best)) != np.array(colour_sites(stated)))
     return FitFinding.judged(
         "response",
-        "colours of the camera's pixels",
+        MOSAIC,
         float(other),
         "1",
         LIMIT,
         f"The camera's pixels see the colours of the lines as those of a mosaic of {best} do, and not of"
-        f" {stated}, as calibrated: spectra are wrong.",
+        f" {stated}, as calibrated. Spectra are wrong, and depth may be, by far more than their deviations"
+        " say.",
         f'Give "bayer": "{best}" in the rig\'s file, or have the driver send mosaics that are not flipped,'
         " with red and blue in their places; then repeat the calibration.",
     )

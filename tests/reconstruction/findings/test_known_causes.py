@@ -11,7 +11,7 @@ from dsl_core.reconstruction.findings.known_causes import (
     with_finer_bands_first,
     with_known_causes,
     without_drift_that_is_none,
-    without_misfit_of_wide_bands,
+    without_effects,
 )
 from dsl_core.reconstruction.findings.model_findings import (
     COLOUR_GAINS,
@@ -22,6 +22,7 @@ from dsl_core.reconstruction.findings.model_findings import (
     ORDERS_APART,
 )
 from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
+from dsl_core.reconstruction.spectral.colour_sites import MOSAIC
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
 
@@ -62,11 +63,21 @@ def test_bands_too_wide_for_the_lines_are_told_alone(name: str, step_nm: float, 
     misfit = finding(name, 0.98, "Surfaces are fluorescent.")
     drift = finding("change of the light", 0.9, "The light has changed.")
     bands = band_findings(step_nm, 10.0, SpectralCounts())
-    fit = Fit.of(without_misfit_of_wide_bands([misfit, drift, *bands]))
+    fit = Fit.of(without_effects([misfit, drift, *bands]))
     assert ("fluorescent" in fit.words) == is_told
     assert ("coarse for lines" in fit.words) == (not is_told)
     assert "The light has changed." in fit.words, "no width of bands makes light drift"
     assert {each.name for each in fit.findings} >= {name}
+
+
+@pytest.mark.parametrize(("name", "is_told"), [(POOR_AREAS, False), (BALANCE, False), (BLACK_AGAIN, True)])
+def test_pixels_of_other_colours_than_stated_are_told_before_film_and_surface(
+    name: str, is_told: bool
+) -> None:
+    """The film was called missing, and depth none of its business, where the mosaic began a column later."""
+    fit = Fit.of(without_effects([finding(MOSAIC, 1.0, "Other colours."), finding(name, 0.98, "It is off.")]))
+    assert "Other colours." in fit.words
+    assert ("It is off." in fit.words) == is_told
 
 
 @pytest.mark.parametrize("name", [POOR_AREAS, MISFIT, GAIN_OF_BOTH, ORDERS_APART, DRIFT_LEFT])

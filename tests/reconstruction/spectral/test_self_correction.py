@@ -17,8 +17,9 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
 from dsl_core.reconstruction.findings.fit import fit_of
-from dsl_core.reconstruction.findings.model_findings import SECONDS, cause_findings
+from dsl_core.reconstruction.findings.model_findings import MISFIT, SECONDS, cause_findings
 from dsl_core.reconstruction.spectral import self_correction, spectra
+from dsl_core.reconstruction.spectral.colour_sites import MOSAIC
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion, with_film
 from dsl_core.reconstruction.spectral.self_correction import fits_better
 from dsl_core.reconstruction.spectral.spectra import COMB_LIGHT, SpectralReconstruction
@@ -233,3 +234,7 @@ def test_what_has_changed_may_have_changed_the_level_of_its_light_as_well(
     assert [fit.level_rel_std for fit in fits] == [0.0, CHANGED_REL_STD]
     assert "may have moved" in fits[1].unseen
     assert fits[1].parts == fits[0].parts
+    other = FitFinding.judged("response", MOSAIC, 1.0, "1", 0.01, "Other colours.", "Set them.")
+    fits.append(fit_of(*given, said, earlier=[other]))
+    told = [any(each.name == MISFIT for each in fit.findings) for fit in fits]
+    assert told == [True, True, False], "with other colours, nothing else is looked for"
