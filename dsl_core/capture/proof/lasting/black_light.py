@@ -37,6 +37,9 @@ AS_WHITE, TIMES, SEEN_SIGMAS = 0.5, 2.0, 6.0
 MOST_LIT, FEW_LIT = 0.5, 0.05
 #: So many such pixels that have a neighbour among them: hot pixels of a sensor are alone.
 FEWEST_LIT = 5
+#: Less of them count if first orders light their row: this share of its pixels, but for so many columns
+#: beside these, is brighter than those so many rows above and below.
+LIT_OF_ROW, BESIDE, ROWS_AWAY = 0.15, 6, 4
 
 
 @dataclass(frozen=True)
@@ -156,7 +159,7 @@ def lit_black(
         both = grid[one] & grid[other]
         near[one] |= both
         near[other] |= both
-    if int(near.sum()) < FEWEST_LIT:
+    if int(near.sum()) < FEWEST_LIT and not _is_dispersed(near, black, noise):
         return None
     down, across = np.nonzero(near)
     rows = raster.rows[down]
@@ -169,6 +172,26 @@ def lit_black(
     step = size_px[0] / raster.shape[1]
     columns = int(across.min() * step), int((across.max() + 1) * step)
     return LitBlack(int(lit.sum()), columns, (int(rows.min()), int(rows.max()) + 1), is_in_stripes)
+
+
+def _is_dispersed(lit: NDArray[np.bool_], black: Counts, noise: Noise) -> bool:
+    """Whether rows of ``lit`` pixels (rows, columns) have light beside them: no hot pixels of a sensor have.
+
+    Of a pointer that is smaller than a pixel of a coarse picture, little else is seen.
+    """
+    counts = black.reshape(lit.shape).astype(np.float32)
+    std = np.sqrt(noise.variance(counts))
+    for row in np.flatnonzero(lit.any(1)):
+        others = [each for each in (row - ROWS_AWAY, row + ROWS_AWAY) if 0 <= each < lit.shape[0]]
+        core = np.convolve(lit[row], np.ones(2 * BESIDE + 1), "same") > 0
+        if not others or core.all():
+            continue
+        # A picture that the room lights may be brighter than one of them, as at an edge.
+        more = (counts[row] - counts[others].max(0))[~core] / std[row][~core]
+        less = (counts[others].min(0) - counts[row])[~core] / std[row][~core]
+        if float((more > SEEN_SIGMAS).mean() - (less > SEEN_SIGMAS).mean()) > LIT_OF_ROW:
+            return True
+    return False
 
 
 def room_light(white: Counts, black: Counts, level: float, noise: Noise, *, is_highest: bool = True) -> str:

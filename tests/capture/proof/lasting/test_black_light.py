@@ -61,3 +61,25 @@ def test_a_bright_room_is_no_pointer(room: float, told: str, sensor: Sensor | No
     assert (told in said) if told else not said
     lower = room_light(white, black, 0.2, noise, is_highest=False)
     assert lower == said.replace(", or use settings of a higher level", "")
+
+
+@pytest.mark.parametrize(
+    ("beside_dn", "of_rows", "is_told"), [(60.0, 3, True), (0.0, 3, False), (60.0, 96, False)]
+)
+def test_a_pointer_of_few_pixels_is_told_from_hot_ones_by_its_first_orders(
+    beside_dn: float, of_rows: int, is_told: bool
+) -> None:
+    shape = SIZE[::-1]
+    light = np.full(shape, 1000.0)
+    dark = np.full(shape, 10.0)
+    dark[40 : 40 + of_rows, 50:110] += beside_dn
+    dark[41, 80:82] += 4000.0
+    rng = np.random.default_rng(4)
+    white, black = (
+        RASTER.take(np.rint(260 + each + 3 * rng.standard_normal(shape)).clip(0, 4095).astype(np.uint16))
+        for each in (light + dark, dark)
+    )
+    seen = lit_black(white, black, RASTER.channels("RGGB"), Noise.of(CALIBRATED, 12), RASTER, SIZE)
+    assert (seen is not None) == is_told
+    if seen is not None:
+        assert (seen.columns, seen.rows) == ((80, 82), (41, 42))
