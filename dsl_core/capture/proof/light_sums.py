@@ -8,8 +8,8 @@ from dsl_core.capture.proof.lines.line_sum import LineSum
 #: No deviation is given as less than this.
 LEAST_STD = 0.005
 _STEADY = (
-    "Switch dynamic contrast, iris, eco mode and limits of power of the projector off, and automatic modes of"
-    " the camera"
+    "Switch dynamic contrast, dynamic black, iris, eco mode and limits of power of the projector off, and"
+    " automatic modes of the camera"
 )
 _RAW = (
     "Switch gamma, tone mapping, high dynamic range and sharpening of the camera and of the projector off,"
@@ -22,8 +22,10 @@ def light_sentence(code: CodeSum | None, lines: LineSum | None) -> str:
     """What is wrong with light that should add up to white; empty if nothing is.
 
     None are sums that say nothing. A projector that dims dark or bright pictures gives the code, half bright,
-    another share than white. A camera whose values are not proportional to the light does not, but for edges
-    of stripes; lines have most of their light in such faint parts.
+    another share than white. One that dims its lamp for black alone makes every picture a little too bright:
+    much for many faint lines together, little for a pair of the code. A camera whose values are not
+    proportional to the light leaves the code as it is, but for edges of stripes; lines have most of their
+    light in such faint parts.
     """
     of_lines = "" if lines is None else f"{lines.share:.2f} ± {max(lines.std, LEAST_STD):.2f}"
     if code is not None and code.is_curved:
@@ -47,9 +49,10 @@ def light_sentence(code: CodeSum | None, lines: LineSum | None) -> str:
     seen = f"All lines together have {of_lines} times the light of white, which they add up to"
     if code is not None and lines.share > 1:
         return (
-            f"{seen}; patterns and their inverses do add up to it. Other light came in while lines were"
-            " captured, or the camera's values are not proportional to the light, or its exposure changed."
-            f" {_RAW}, switch automatic exposure and gain off, {_KEEP}"
+            f"{seen}; patterns and their inverses do add up to it. The projector makes a picture that is all"
+            " black darker than the dark parts of others (dynamic black, iris), other light came in while"
+            " lines were captured, or the camera's values are not proportional to the light, or its exposure"
+            f" changed. {_STEADY}. {_RAW}, {_KEEP}"
         )
     return (
         f"{seen}. The projector gives dark pictures another share of its light than bright ones, the exposure"
