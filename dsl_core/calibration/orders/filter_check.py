@@ -28,6 +28,9 @@ DENSITY_STD = 0.04
 #: So many others say how distance goes with wavelength; so many at least say the film's line density, and
 #: fewer are compared with its data sheet.
 ENOUGH, FEW = 5, 3
+#: Wavelengths of filters that are in their places rise with the sine at least by this share of the film's
+#: period: a quadratic would go through those of a set in reversed order as well.
+LEAST_RISE = 0.5
 #: Keeps a quadratic through filters of one wavelength finite; its deviation says that it is unknown.
 NEARLY_NOTHING = 1e-10
 #: Where film or target are not square to the light, density seems to change with wavelength by so much.
@@ -54,8 +57,8 @@ def found_wavelengths(rig: Rig, filters: Sequence[PlacedFilter]) -> list[tuple[f
     """Where each filter is by the places of its orders: wavelength and deviation (nm), None without orders.
 
     Each filter is compared with a quadratic through all others of the same order, robustly; with few others,
-    or where that says less, with the line density that the middle one of them sees; with fewer, with the
-    film's data sheet.
+    or where that says less or wavelengths do not rise with distance, with the line density that the middle
+    one of them sees; with fewer, with the film's data sheet.
     """
     by_order = [_by_others(rig, filters, order) for order in (1, -1)]
     found: list[tuple[float, float] | None] = []
@@ -79,14 +82,19 @@ def _by_others(rig: Rig, filters: Sequence[PlacedFilter], order: int) -> list[tu
     spread = np.array([each.offsets_px.get(order, (np.nan, 0.0))[1] for each in filters])
     centre = np.array([MEASURED_NM if each.measured_curve else NOMINAL_NM for each in filters])
     seen = np.isfinite(at)
-    nm_per_px = float(np.ptp(nm[seen])) / max(float(np.ptp(at[seen])), 1e-6) if seen.any() else 0.0
+    if seen.sum() <= ENOUGH:
+        return [None] * len(filters)
+    nm_per_px = float(np.ptp(nm[seen])) / max(float(np.ptp(at[seen])), 1e-6)
     tolerance = np.hypot(centre, nm_per_px * spread)
     # Wavelength over sine, which is nearly straight, so that the answer is a wavelength.
     sine = np.sin(np.arctan(at / rig.projector.fx_px))
+    away = sine[seen] - sine[seen].mean()
+    if away @ nm[seen] < LEAST_RISE * rig.film.period_nm * (away @ away):
+        return [None] * len(filters)
     found: list[tuple[float, float] | None] = []
     for i in range(len(filters)):
         others = seen & (np.arange(len(filters)) != i)
-        if not np.isfinite(at[i]) or others.sum() < ENOUGH:
+        if not np.isfinite(at[i]):
             found.append(None)
             continue
         x = (sine - sine[others].mean()) / max(float(np.ptp(sine[others])), 1e-9)

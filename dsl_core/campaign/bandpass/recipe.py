@@ -311,11 +311,11 @@ def _of_filters(record: BandpassCalibration) -> list[Figure]:
                 std=record.filters_off_std_nm,
                 low=-limit,
                 high=limit,
-                advice="The filters pass other wavelengths than stated, one of them less light, or the"
-                " spectroradiometer's wavelengths are off. Check that each filter is clean, alone in the beam"
-                " and flat in front of the lens, and that the transmissions are those of these filters, seen"
-                " straight on; check the spectroradiometer by a lamp with known"
-                " lines.",
+                advice="The filters pass other wavelengths than stated, each was in the place of the next,"
+                " one passes less light, or the spectroradiometer's wavelengths are off. Check that they"
+                " were captured in the order of the steps, that each is clean, alone in the beam and flat in"
+                " front of the lens, and that the transmissions are those of these filters, seen straight on;"
+                " check the spectroradiometer by a lamp with known lines.",
             )
         )
     if record.filter_index is not None:

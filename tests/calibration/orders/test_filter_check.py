@@ -100,6 +100,18 @@ def test_two_swapped_filters_of_four_are_named_and_the_others_are_not() -> None:
     assert "where those of 610 ± 6 nm should be" in verdicts[1][1]
 
 
+@pytest.mark.parametrize("centres", [CENTRES[:6], CENTRES])
+def test_filters_in_reversed_order_are_named_with_where_they_are(centres: tuple[float, ...]) -> None:
+    filters = placed(dict(zip(centres, centres[::-1], strict=True)))[: len(centres)]
+    found = found_wavelengths(published_rig(), filters)
+    verdicts = [
+        verdict(published_rig(), each, where, 3.0, 1.0) for each, where in zip(filters, found, strict=True)
+    ]
+    assert verdicts[0][0]
+    assert verdicts[-1][0]
+    assert sum(unusable for unusable, _ in verdicts) >= len(centres) - 2
+
+
 UNEVEN = (
     (430.0, 440.0, 450.0, 460.0, 470.0, 480.0, 650.0),
     (430.0, 450.0, 470.0, 490.0, 510.0, 530.0, 650.0),
