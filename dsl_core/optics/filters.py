@@ -71,6 +71,16 @@ def three_cavities(distance_nm: Floats, fwhm_nm: float, peak: float = 0.8) -> Fl
     return np.asarray(peak / (1 + (2 * distance_nm / fwhm_nm) ** 6))
 
 
+def passed_width_nm(transmission: SpectralCurve) -> float:
+    """Width of the rectangle as high as a transmission's peak that passes as much, nm; 0 for an opaque one.
+
+    >>> round(passed_width_nm(nominal_filter(550.0, 20.0)))
+    21
+    """
+    values = np.array(transmission.values)
+    return float(np.trapezoid(values, transmission.wavelengths_nm) / max(values.max(), 1e-9))
+
+
 def through_filter(
     transmission: SpectralCurve, shift: Floats | None = None, weight: Floats | None = None
 ) -> Floats:

@@ -11,6 +11,7 @@ from dsl_core.optics.filters import (
     FINE_NM,
     nominal_filter,
     passed,
+    passed_width_nm,
     relative_shift,
     shift_slopes,
     shift_terms,
@@ -28,6 +29,12 @@ def test_a_nominal_filter_has_its_peak_and_half_of_it_half_a_width_away() -> Non
     assert at == pytest.approx([0.7, 0.35, 0.35, 0.7 / 65, 0.7 / 65])
     usual = nominal_filter(500.0)
     assert usual.at(np.array([500.0, 495.0, 505.0])) == pytest.approx([0.8, 0.4, 0.4])
+
+
+@pytest.mark.parametrize("fwhm_nm", [10.0, 20.0, 40.0])
+def test_the_width_of_what_a_filter_passes_is_about_that_at_half_of_its_peak(fwhm_nm: float) -> None:
+    for peak in (0.3, 0.8):
+        assert passed_width_nm(nominal_filter(550.0, fwhm_nm, peak)) == pytest.approx(fwhm_nm, rel=0.06)
 
 
 def test_light_through_a_filter_is_that_of_white_times_its_transmission_and_none_outside_it() -> None:

@@ -42,6 +42,7 @@ from dsl_core.optics.filters import (
     NO_SHIFT,
     FilterAngle,
     passed,
+    passed_width_nm,
     relative_shift,
     shift_terms,
     through_filter,
@@ -203,7 +204,8 @@ def _placed(each: SeenFilter, light: Floats) -> PlacedFilter:
         for order in ORDERS
         if np.isfinite(each.light.orders[order].offset_px)
     }
-    return PlacedFilter(each.filter_nm, effective_nm(light), each.measured_curve, offsets)
+    width_nm = passed_width_nm(each.transmission)
+    return PlacedFilter(each.filter_nm, effective_nm(light), each.measured_curve, offsets, width_nm)
 
 
 def _check(

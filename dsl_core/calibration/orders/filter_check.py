@@ -45,12 +45,16 @@ RESPONSE_STD, STRAY = 0.2, 0.01
 
 @dataclass(frozen=True)
 class PlacedFilter:
-    """A filter's effective wavelength and the distances of its first orders, (px, deviation) by order."""
+    """A filter's effective wavelength and the distances of its first orders, (px, deviation) by order.
+
+    ``width_nm`` is that of what it passes by its transmission.
+    """
 
     filter_nm: float
     effective_nm: float
     measured_curve: bool
     offsets_px: dict[int, tuple[float, float]]
+    width_nm: float = 0.0
 
 
 def found_wavelengths(rig: Rig, filters: Sequence[PlacedFilter]) -> list[tuple[float, float] | None]:
@@ -150,7 +154,7 @@ def verdict(
 ) -> tuple[bool, str]:
     """Whether a filter is unusable, and a sentence on what is wrong with it (empty: nothing)."""
     name = f"the filter of {each.filter_nm:g} nm"
-    if width_px > BROAD_PX * widening(rig, each.effective_nm) or share < BROAD_SHARE:
+    if width_px > BROAD_PX * widening(rig, each.effective_nm, each.width_nm) or share < BROAD_SHARE:
         return True, (
             f"{name}: the light of the first orders is spread over {2 * width_px:.0f} columns, as without a"
             " narrow filter. Put the filter in front of the camera, shade ambient light, and capture the step"

@@ -45,7 +45,7 @@ from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.filters import nominal_filter
+from dsl_core.optics.filters import nominal_filter, passed_width_nm
 from dsl_core.optics.unlit import first_order_reach_px, unlit_px
 from dsl_core.progress import Progress
 from dsl_core.words import sentence
@@ -219,6 +219,8 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
 
     def _filter(self, bench: Bench, rig: Rig, step: Step, scan: LineScan) -> SeenFilter:
         note, source = bench.kept(step, CURVE_NAME, FilterNote), bench.scan_of(step)
+        # A width that is stated after the capture counts as well.
+        curve = note.transmission if note.measured else nominal_filter(note.filter_nm, self.fwhm_nm)
         lines = scan_lines_of(source)
         radiance, std = line_frames(source, rig, scan.pixels)
         light = filter_light(
@@ -230,15 +232,13 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
             first_order_reach_px(rig),
             unlit_px(rig, lines.width_px),
             rig.projector.width_px,
-            widening(rig, note.filter_nm),
+            widening(rig, note.filter_nm, passed_width_nm(curve)),
         )
         if light.saturated > 0.5:
             raise CalibrationError(
                 f"{step.title}: the zero order is saturated in {light.saturated:.0%} of the pixels. Capture"
                 " the step again with nothing changed since the test shot."
             )
-        # A width that is stated after the capture counts as well.
-        curve = note.transmission if note.measured else nominal_filter(note.filter_nm, self.fwhm_nm)
         return SeenFilter(note.filter_nm, curve, note.measured, light)
 
 

@@ -199,3 +199,9 @@ def test_a_filter_is_broad_by_its_nanometres(
     rig = rig.model_copy(update={"projector": lens, "film": film})
     each = placed()[CENTRES.index(550.0)]
     assert verdict(rig, each, (550.0, 1.0), rms_px, 1.0)[0] == unusable
+
+
+@pytest.mark.parametrize(("width_nm", "unusable"), [(10.0, True), (21.0, True), (42.0, False)])
+def test_a_filter_that_is_stated_to_be_broad_may_be(width_nm: float, unusable: bool) -> None:
+    each = replace(placed()[CENTRES.index(550.0)], width_nm=width_nm)
+    assert verdict(published_rig(), each, (550.0, 1.0), 14.0, 1.0)[0] == unusable

@@ -21,12 +21,18 @@ DARK, NOISE = 0.05, 0.01
 
 
 def seen(
-    moved_px: float = 0.0, saturated: int = 0, uneven: float = 0.0, times: int = 1, widening: float = 1.0
+    moved_px: float = 0.0,
+    saturated: int = 0,
+    uneven: float = 0.0,
+    times: int = 1,
+    widening: float = 1.0,
+    blue_px: float = 0.0,
 ) -> FilterLight:
     """White pixels all over the image, a Gaussian of 3 px for each order; amplitudes differ by colour.
 
     ``uneven`` is by which share orders are brighter or darker in every other cell of the image; ``times`` how
-    many times more columns the projector has, and ``widening`` what is known of that.
+    many times more columns the projector has, and ``widening`` what is known of that; ``blue_px`` is how much
+    nearer to the zero order blue pixels see first orders, by the flank of a broad filter.
     """
     rng = np.random.default_rng(0)
     down, across = np.meshgrid(np.linspace(0.01, 0.99, 40), np.linspace(0.01, 0.99, 100), indexing="ij")
@@ -38,7 +44,8 @@ def seen(
     distance = centres - column
     light = zero_order_profile(torch.as_tensor(moved_px - distance), -2.5, 2.5, RESPONSE).numpy()
     for order, ratio in RATIO.items():
-        bell = np.exp(-0.5 * ((distance / times - AT_PX[order] - 6 * (place[1] - 0.5)) / 3.0) ** 2) / times
+        at_px = AT_PX[order] - np.sign(order) * blue_px * (colour == 2) + 6 * (place[1] - 0.5)
+        bell = np.exp(-0.5 * ((distance / times - at_px) / 3.0) ** 2) / times
         cell = (4 * place[0]).astype(int) + (6 * place[1]).astype(int)
         light = light + ratio * (1 + uneven * (-1) ** cell) * LINES.step_px * bell / (
             3.0 * np.sqrt(2 * np.pi)
@@ -112,3 +119,13 @@ def test_all_light_of_an_order_is_summed_on_a_projector_of_many_columns(widening
     for order in (1, -1):
         assert (wide[order].ratio == pytest.approx(RATIO[order], rel=0.01)) == whole
         assert wide[order].width_px == pytest.approx(9.0, rel=0.03) or not whole
+
+
+@pytest.mark.parametrize(("widening", "whole"), [(2.0, True), (1.0, False)])
+def test_colours_that_see_the_flank_of_a_broad_filter_are_summed_as_well(
+    widening: float, whole: bool
+) -> None:
+    orders = seen(widening=widening, blue_px=24.0).orders
+    for order in (1, -1):
+        assert orders[order].ratio[:2] == pytest.approx(RATIO[order], rel=0.02)
+        assert (orders[order].ratio[2] == pytest.approx(RATIO[order], rel=0.02)) == whole
