@@ -48,7 +48,7 @@ ADDED_SETTINGS = ("rig", "exposures")
 
 @dataclass(frozen=True)
 class StepStatus:
-    """The state of a step; ``reason`` says why its captures are refused."""
+    """The state of a step; ``reason`` says why its captures are refused, or which settings they lack."""
 
     step: Step
     state: State
@@ -104,9 +104,19 @@ class CalibrationSession:
             if found:
                 reason = f"it was captured with other devices or settings: {'; '.join(found)}"
                 return StepStatus(step, "refused", reason)
-            return StepStatus(step, "captured" if self.recipe.is_captured(self.bench, step) else "missing")
+            state: State = "captured" if self.recipe.is_captured(self.bench, step) else "missing"
+            return StepStatus(step, state, self._without(step, note))
         except StoreError as error:
             return StepStatus(step, "refused", str(error))
+
+    def _without(self, step: Step, note: CaptureNote | None) -> str:
+        """Which settings of today the captures of a step were made without; empty where there are none."""
+        then = {} if note is None else note.settings
+        now = self.recipe.acts_at_capture(step)
+        other = [f"{name}={then[name]:g}" for name in now if then.get(name, now[name]) != now[name]]
+        return (
+            f"it was captured with {', '.join(other)}; other values act on new captures only" if other else ""
+        )
 
     def place(self, step: Step) -> bool:
         """Let the rig place the target of a step; False when a person has to."""
@@ -150,7 +160,11 @@ class CalibrationSession:
 
     def _capture(self, step: Step, progress: Progress) -> None:
         folder = self._folder(step)
-        note = read_note(folder) or CaptureNote(conditions=current_conditions(self.devices), started=now())
+        note = read_note(folder) or CaptureNote(
+            conditions=current_conditions(self.devices),
+            started=now(),
+            settings=self.recipe.acts_at_capture(step),
+        )
         note = note.model_copy(update={"steps": len(self.steps)})
         replace_record(folder / NOTE_NAME, note)
         before = max(self._captured(), self._captured_before())

@@ -36,12 +36,14 @@ class ConsoleGuide:
     tolerant: bool = False
 
     def begins(self, session: CalibrationSession, missing: int) -> None:
-        """Say what follows, and why existing captures are not good enough."""
+        """Say what follows, why existing captures are not good enough, and what they were made without."""
         steps = len(session.steps)
         self.output.say(f"{session.recipe.title}: {missing} of {steps} steps to capture, then the fit.")
         for each in session.statuses():
             if each.state == "refused":
                 self.output.say(f"  {each.step.title} is captured again: {each.reason}")
+            elif each.reason:
+                self.output.say(f"  {each.step.title}: {each.reason} (--redo {each.step.key})")
 
     def place(self, step: Step) -> None:
         """Ask a person to place the target."""

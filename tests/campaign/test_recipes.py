@@ -7,6 +7,7 @@ import pytest
 from dsl_core.campaign.bandpass.recipe import BandpassRecipe
 from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.depth_stage.recipe import DepthStageRecipe
+from dsl_core.campaign.geometry.recipe import GeometryRecipe
 from dsl_core.campaign.recipes import _build, _value, load_recipe, recipe_names
 from dsl_core.campaign.spectralon.recipe import SpectralonRecipe
 from dsl_core.errors import CalibrationError
@@ -33,6 +34,22 @@ def test_light_is_measured_by_what_shows_it_without_a_filter() -> None:
     assert not light(DepthStageRecipe(chain=False), "plane-620")
     assert not light(DepthStageRecipe(), "filter-450", 450.0)
     assert not light(FakeRecipe(), "bright")
+
+
+def test_settings_that_only_captures_heed_are_named_step_by_step() -> None:
+    def heeded(recipe: AnyRecipe, key: str, filter_nm: float | None = None) -> dict[str, float]:
+        place = Placement(target="spectralon", film=True, filter_nm=filter_nm)
+        return recipe.acts_at_capture(Step(key, "It", "Do it.", place))
+
+    assert heeded(BandpassRecipe(), "plane") == {}
+    lines = {"line_px": 5, "long_ratio": 6.0}
+    assert heeded(BandpassRecipe(long_ratio=6.0), "filter-450", 450.0) == lines
+    assert heeded(DepthStageRecipe(), "plane-620") == {"code_step_px": 4}
+    assert heeded(DepthStageRecipe(), "filter-450", 450.0) == {"filter_step_px": 16}
+    assert heeded(SpectralonRecipe(readings=3), "emission") == {"readings": 3}
+    assert heeded(SpectralonRecipe(emission_folder="spectra"), "emission") == {}
+    assert heeded(SpectralonRecipe(), "pictures") == {}
+    assert heeded(GeometryRecipe(ratio=2.0), "pose-01") == {"ratio": 2.0}
 
 
 @pytest.mark.parametrize(

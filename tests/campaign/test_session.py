@@ -14,14 +14,18 @@ import pytest
 
 from dsl_core.campaign import session as session_module
 from dsl_core.campaign.assembly import accepted_calibrations, assemble, nominal_rig
+from dsl_core.campaign.common.captures import read_note
 from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.guide import calibrate_all, run_calibration
 from dsl_core.campaign.session import CalibrationSession
+from dsl_core.cli.guidance import ConsoleGuide
+from dsl_core.cli.output import Output
 from dsl_core.devices.base import CameraInfo, DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError, Cancelled, StoreError
 from dsl_core.io import campaign_folder
 from dsl_core.io.campaign_folder import CampaignFolder, later_than
+from dsl_core.io.records import replace_record
 from dsl_core.io.rig_file import load_rig, save_rig
 from dsl_core.io.sealed import unseal
 from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -342,6 +346,39 @@ def test_other_settings_are_fitted_again_from_the_same_captures(
     assert new.accepted > old.accepted
     assert new.settings["largest_dn"] == "3000"
     assert session(devices, other, recipe).accepted() == new
+
+
+def test_a_setting_that_only_captures_heed_is_told_until_they_are_made_with_it(
+    devices: DeviceRig, campaign: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_calibration(session(devices, campaign, FakeRecipe()), Willing(), NoProgress())
+    other = campaign.with_settings("fake", {"level": "0.5"})
+    changed = session(devices, other, FakeRecipe(level=0.5))
+    dim, bright = changed.statuses()
+    assert (dim.state, dim.reason) == ("captured", "")
+    assert bright.state == "captured"
+    assert bright.reason == "it was captured with level=1; other values act on new captures only"
+    ConsoleGuide(Output(as_json=False), None).begins(changed, 0)
+    assert f"  bright picture: {bright.reason} (--redo bright)\n" in capsys.readouterr().out
+    run_calibration(changed, Willing(), NoProgress(), redo=["bright"])
+    assert [each.reason for each in changed.statuses()] == ["", ""]
+    assert (
+        session(devices, other, FakeRecipe())
+        .statuses()[1]
+        .reason.startswith("it was captured with level=0.5")
+    )
+
+
+def test_captures_of_earlier_versions_are_not_said_to_lack_settings(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    run_calibration(session(devices, campaign, FakeRecipe()), Willing(), NoProgress())
+    for path in campaign.path.rglob(campaign_folder.NOTE_NAME):
+        note = read_note(path.parent)
+        assert note is not None
+        replace_record(path, note.model_copy(update={"settings": {}}))
+    changed = session(devices, campaign, FakeRecipe(level=0.5))
+    assert [(each.state, each.reason) for each in changed.statuses()] == [("captured", "")] * 2
 
 
 def test_files_that_say_something_else_now_are_fitted_again(

@@ -43,6 +43,7 @@ class FakeRecipe(Recipe[Brightness]):
     looks: list[str] = field(default_factory=list)
     captured: list[str] = field(default_factory=list)
     done_before: tuple[str, ...] = ()
+    level: float = 1.0
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One a key."""
@@ -58,6 +59,10 @@ class FakeRecipe(Recipe[Brightness]):
         advice = "Move the target closer."
         return (Figure(name="looks", value=len(self.looks), unit="", low=self.good_look, advice=advice),)
 
+    def acts_at_capture(self, step: Step) -> dict[str, float]:
+        """The level, of all but the first step."""
+        return {} if step.key == self.keys[0] else {"level": self.level}
+
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Scan one colour, brighter from step to step."""
         level = (self.keys.index(step.key) + 1) / len(self.keys)
@@ -66,7 +71,7 @@ class FakeRecipe(Recipe[Brightness]):
             name=step.key,
             code=NoCode(),
             spectral=Columns(levels=(((level,) * 3,) * width,)),
-            settings=(Setting(exposure_ms=5.0, level=1.0),),
+            settings=(Setting(exposure_ms=5.0, level=self.level),),
             code_settings=(0,),
         )
         bench.scan(step, lambda: plan, progress)

@@ -132,6 +132,10 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
         """The target without filter does, whatever the Spectralon said before."""
         return step.key == PLANE
 
+    def acts_at_capture(self, step: Step) -> dict[str, float]:
+        """Lines and exposures of the filters."""
+        return {} if step.key == PLANE else {"line_px": self.line_px, "long_ratio": self.long_ratio}
+
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose exposures by a test shot and scan; a scan that was begun keeps its own exposures."""
         bench.scan(step, lambda: self._begin(bench, step), progress)

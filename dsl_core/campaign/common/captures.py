@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from dsl_core.devices.base import CameraInfo, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
@@ -35,7 +35,8 @@ _PROJECTOR: TypeAdapter[ProjectorInfo | None] = TypeAdapter(ProjectorInfo | None
 class CaptureNote(Record):
     """What a session writes next to the captures of a step; ``refused`` is the reason, empty for none.
 
-    ``steps`` is how many the calibration had when this one was captured; 0 is unknown.
+    ``steps`` is how many the calibration had when this one was captured; 0 is unknown. ``settings`` are those
+    of `Recipe.acts_at_capture` then.
     """
 
     conditions: CaptureConditions
@@ -43,6 +44,7 @@ class CaptureNote(Record):
     finished: str = ""
     refused: str = ""
     steps: int = 0
+    settings: dict[str, float] = Field(default_factory=dict)
 
 
 def read_note(folder: Path) -> CaptureNote | None:

@@ -148,6 +148,10 @@ class Recipe(ABC, Generic[RecordT]):
         """Whether the captures of a step say how bright the light of the calibrated rig is."""
         return False
 
+    def acts_at_capture(self, step: Step) -> dict[str, float]:
+        """Settings, by name, that only a capture of a step heeds: what is captured keeps those it had."""
+        return {}
+
     @abstractmethod
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Capture a step into its folder; continues captures that an earlier call left unfinished."""

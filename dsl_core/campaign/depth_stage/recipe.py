@@ -155,6 +155,12 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         """The lines without filter do, where they correct the chain."""
         return self.chain and step.placement.filter_nm is None
 
+    def acts_at_capture(self, step: Step) -> dict[str, float]:
+        """The lines, with and without filter."""
+        if step.placement.filter_nm is None:
+            return {"code_step_px": self.code_step_px}
+        return {"filter_step_px": self.filter_step_px}
+
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Move the stage, choose exposures by a test shot, and scan; a scan that was begun continues.
 

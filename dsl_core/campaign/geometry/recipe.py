@@ -71,6 +71,10 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
         white = shoot_white(bench)
         return look_at_board(white, self._board(bench), bench.rig, step.title, bench.found)
 
+    def acts_at_capture(self, step: Step) -> dict[str, float]:
+        """The second exposure."""
+        return {"ratio": self.ratio}
+
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose an exposure by a test shot and capture the code; a scan that was begun continues.
 

@@ -99,6 +99,10 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
         """The pictures do: of the spectra only their shapes count."""
         return step.key == PICTURES
 
+    def acts_at_capture(self, step: Step) -> dict[str, float]:
+        """How often spectra are read, as far as they do not come from files."""
+        return {"readings": self.readings} if step.key == EMISSION and self._files() is None else {}
+
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Read spectra, or choose exposures by a test shot and capture."""
         if step.key == EMISSION:

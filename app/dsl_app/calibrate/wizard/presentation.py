@@ -260,6 +260,8 @@ def _step_verdict(state: WizardState) -> Verdict:
     if state.is_checking.value:
         return "Looking…", "muted"
     if status is not None and status.state == "captured":
+        if status.reason:
+            return f"✓ Captured, but {status.reason}.", "warn"
         return "✓ Captured. If you redo it, the old capture is kept until the new one is complete.", "good"
     if status is not None and status.state == "refused":
         return f"✗ Refused: {status.reason}", "bad"

@@ -345,6 +345,7 @@ def test_a_step_shows_where_the_target_is_wanted_and_what_was_found_of_it() -> N
         (wizard(FIRST, doing=Doing.CAPTURING, look=Look("a", (BAD,))), "Capturing. Do not touch", "warn"),
         (wizard(FIRST, doing=Doing.STOPPING), "Capturing. Do not touch", "warn"),
         (wizard(FIRST, HALF), "✓ Captured.", "good"),
+        (wizard(SECOND, ("missing", "captured")), "✓ Captured, but it was moved.", "warn"),
         (wizard(SECOND, ("captured", "refused")), "✗ Refused: it was moved", "bad"),
     ],
 )
