@@ -41,6 +41,8 @@ LIGHTS = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
 FOLDS = 4
 #: Patches with more saturated pixels, or fewer pixels, are refused.
 SATURATED, MIN_PIXELS = 0.02, 8
+#: A patch that has less of the expected light than this share of what the others have is not lit.
+LEAST_LIT = 0.1
 #: The white that the rig already reproduces is known to this, at best.
 WHITE_FLOOR = 2e-4
 #: Limits in percent of a patch's white.
@@ -98,7 +100,22 @@ def measure_patches(
                 f"The patch {name!r} of the Color Checker has only {count} pixels of one colour. Move the"
                 " chart closer."
             )
+    require_lit(seen[-1], rig, chart)
     return seen
+
+
+def require_lit(white: PatchSignals, rig: Rig, chart: str) -> None:
+    """Raise `CalibrationError` naming the patches that white does not reach."""
+    lit = np.nansum(white.mean, 1) / expected_colours(rig, chart).sum(1)
+    dark = lit < LEAST_LIT * np.median(lit)
+    if dark.any():
+        names = np.array(list(chart_reflectance(FINE_NM, chart)))[dark]
+        named = ", ".join(repr(str(name)) for name in names)
+        raise CalibrationError(
+            f"The projector does not light all patches of the Color Checker: {named} had less than"
+            f" {LEAST_LIT:.0%} of the light of the others. Move the chart to where the projected picture"
+            " covers all 24 patches, farther away if need be, and take away what shades it."
+        )
 
 
 def refine_on_chart(

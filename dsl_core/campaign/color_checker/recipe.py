@@ -16,6 +16,7 @@ from dsl_core.calibration.colour.color_checker import (
     measure_patches,
     patch_colours,
     refine_on_chart,
+    require_lit,
 )
 from dsl_core.calibration.colour.patches import (
     ChartPose,
@@ -23,6 +24,7 @@ from dsl_core.calibration.colour.patches import (
     find_chart,
     orient_chart,
     patch_samples,
+    patch_signals,
 )
 from dsl_core.campaign.common.bounds import Finite, Positive
 from dsl_core.campaign.common.depths import seen_whole_mm, target_depth_mm
@@ -96,11 +98,15 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         return _NO_COLOURS if len(mosaic_colours(rig.sensor.bayer)) == 1 else ""
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
-        """Whether the chart is found, and how it is turned; raises `CalibrationError`."""
+        """Whether the chart is found, lit, and how it is turned; raises `CalibrationError`."""
         self._require_colours(bench.rig)
         white = shoot_white(bench)
         pose = self._pose(white.picture.astype(np.float32), bench.rig, f"the test shot of {step.title}")
-        patch_samples(pose.corners_px, (white.picture.shape[0], white.picture.shape[1]))
+        samples = patch_samples(pose.corners_px, (white.picture.shape[0], white.picture.shape[1]))
+        none = np.zeros(white.picture.shape, bool)
+        require_lit(
+            patch_signals(white.picture, none, bench.rig.sensor.bayer, samples), bench.rig, self.chart
+        )
         bench.found(np.asarray(pose.corners_px, float))
         return (
             Figure(name="patches found", value=24, unit="", low=24),

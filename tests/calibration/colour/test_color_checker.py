@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -152,6 +153,21 @@ def test_patches_are_measured_at_unit_shading_and_saturated_or_small_ones_named(
     few = replace(samples, pixels=(samples.pixels[0][:12], *samples.pixels[1:]))
     with pytest.raises(CalibrationError, match=f"patch '{name}' of the Color Checker has only [0-7] pixels"):
         measure_patches(taken, rig, few, CHART)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.12, False), (0.08, True), (0.0, True)])
+def test_patches_that_the_projector_does_not_light_are_named(share: float, told: bool) -> None:
+    rig = truth()
+    taken, samples = pictures(rig), patch_samples(POSE.corners_px, (96, 140))
+    taken.radiance[:, 68:88, 10:50] *= share
+    with (
+        pytest.raises(
+            CalibrationError, match=r"not light all .*: 'white .*', 'neutral 8 .*' had less than 10%"
+        )
+        if told
+        else nullcontext()
+    ):
+        assert measure_patches(taken, rig, samples, CHART)
 
 
 def whites(rig: Rig) -> np.ndarray:
