@@ -6,6 +6,8 @@ driver or its link do to them shows by the mark that each such alteration leaves
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,9 +32,9 @@ CHANGED, KEPT = 0.15, 0.05
 NO_LIGHT, FEWEST_ROWS, MOST_ROWS = 0.05, 2, 0.7
 #: Rows of which pixels work have this share of the noise of black that they had, and black but for so much.
 ALIVE, SAME_BLACK_DN = 0.6, 2.0
-#: Pictures are clipped where this share of the pixels has the largest value, below this share of full scale,
-#: and so many times as many as the two values below it, which noise of a flat surface fills as well.
-CLIPPED, BELOW_FULL, PILED = 0.01, 0.9, 2
+#: Pictures are clipped where this share of the pixels has the largest value, below full scale, and so many
+#: times as many as the two values below it, which noise of a flat surface fills as well.
+CLIPPED, PILED = 0.01, 2
 #: A picture alone says so with more than this share of full scale.
 BRIGHT_SHARE = 0.2
 #: White follows that of before by another power than one by so much, alike in every colour, and as closely as
@@ -161,51 +163,50 @@ def _dark_rows(before: Pictures, now: Pictures, sensor: Sensor) -> str:
 
 
 def _clipped(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
-    """Whether white ends below full scale, all of it or one colour."""
-    of_all = _new_limit(before, now, sensor)
-    if of_all is not None:
-        return _said_of_limit("white", *of_all)
-    sites = np.array(colour_sites(sensor.bayer)).reshape(2, 2)
-    for colour, name in enumerate(COLOUR_NAMES):
-        own = np.tile(sites == colour, (now.shape[0] // 2 + 1, now.shape[1] // 2 + 1))
-        own = own[: now.shape[0], : now.shape[1]]
-        found = _new_limit(before[own], now[own], sensor) if own.any() else None
-        if found is not None:
-            return _said_of_limit(f"white in {name}", *found)
+    """Whether white ends below full scale, all of it or one colour, and did not before."""
+    for words, own in _parts(now.shape, sensor):
+        found = _limit_of(now[own], sensor)
+        old = before[own]
+        if found is not None and float((old == old.max()).mean()) <= found[1] / 4:
+            return _said_of_limit(f"white{words}", *found)
     return ""
 
 
 def ends_early(picture: Mosaic, sensor: Sensor) -> str:
-    """Whether the counts of a bright picture end below full scale; empty if they do not."""
-    found = _limit_of(picture, sensor)
-    range_dn = sensor.full_scale_dn - sensor.black_level_dn
-    if found is None or found[0] - sensor.black_level_dn <= BRIGHT_SHARE * range_dn:
-        return ""
-    return _said_of_limit("it", *found)
+    """Whether the counts of a bright picture, or of a colour of it, end below full scale; empty if not."""
+    for words, own in _parts(picture.shape, sensor):
+        found = _limit_of(picture[own], sensor)
+        if found is not None and found[0] > BRIGHT_SHARE * sensor.full_scale_dn:
+            return _said_of_limit(f"it{words}", *found)
+    return ""
 
 
-def _limit_of(picture: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
-    """The value below full scale that counts pile up at, and the share of pixels that have it."""
-    values, counts = np.unique(picture, return_counts=True)
-    most, share = int(values[-1]), float(counts[-1]) / picture.size
-    is_piled_up = counts[-1] > PILED * counts[-3:-1].sum()
-    if most >= BELOW_FULL * sensor.full_scale_dn or share < CLIPPED or not is_piled_up:
-        return None
-    return most, share
+def _parts(shape: tuple[int, ...], sensor: Sensor) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """All pixels of a mosaic (rows, columns), and those of each colour, with words that say which."""
+    yield "", np.ones(shape, np.bool_)
+    rows, columns = np.indices(shape) % 2
+    colour = np.array(colour_sites(sensor.bayer)).reshape(2, 2)[rows, columns]
+    for each, name in enumerate(COLOUR_NAMES):
+        if (colour == each).any():
+            yield f" in {name}", colour == each
 
 
-def _new_limit(before: Mosaic, now: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
-    """The limit of ``now`` if the counts of ``before`` did not end like that."""
-    found = _limit_of(now, sensor)
-    if found is None or float((before == before.max()).mean()) > found[1] / 4:
-        return None
-    return found
+def _limit_of(counts: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
+    """The value below full scale that counts pile up at, and the share of pixels that have it.
+
+    Digital gain below one, as of a white balance, leaves little between it and full scale.
+    """
+    values, numbers = np.unique(counts, return_counts=True)
+    most, share = int(values[-1]), float(numbers[-1]) / counts.size
+    is_piled_up = numbers[-1] > PILED * numbers[-3:-1].sum()
+    return (most, share) if most < sensor.full_scale_dn and share >= CLIPPED and is_piled_up else None
 
 
 def _said_of_limit(where: str, most: int, share: float) -> str:
     return (
         f"No pixel of {where} has more than {most} DN, and {share:.0%} have just that: the camera"
-        " saturates below its full scale. Set gain, bit depth and limits of its driver as they were."
+        " saturates below its full scale. Set gain, white balance, bit depth and limits of its driver as they"
+        " were."
     )
 
 

@@ -176,6 +176,20 @@ def test_a_bright_picture_whose_counts_end_below_full_scale_says_so_alone(
     assert (f"has more than {most_dn} DN" in ends_early(white, SENSOR)) == is_told
 
 
+def test_a_colour_that_a_digital_white_balance_ends_just_below_full_scale_says_so() -> None:
+    white = np.minimum(4 * pictures(1)[0].astype(np.float64), SENSOR.full_scale_dn)
+    blue = white[1::2, 1::2]
+    blue[...] = np.rint(SENSOR.black_level_dn + 0.92 * (blue - SENSOR.black_level_dn))
+    most_dn = int(blue.max())
+    assert most_dn > 0.92 * SENSOR.full_scale_dn
+    assert f"No pixel of it in blue has more than {most_dn} DN" in ends_early(white.astype(np.uint16), SENSOR)
+
+
+def test_twelve_bits_delivered_as_ten_end_early() -> None:
+    white = np.minimum(8 * pictures(1)[0].astype(np.uint32), int(SENSOR.full_scale_dn)) >> 2
+    assert "has more than 1023 DN" in ends_early(white.astype(np.uint16), SENSOR)
+
+
 def test_neither_black_nor_a_sound_white_ends_early() -> None:
     white, black, code = pictures(1)
     assert [ends_early(each, SENSOR) for each in (white, black, code)] == ["", "", ""]
