@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from dsl_core.capture.altered import alteration, ends_early
-from dsl_core.capture.motion import TILES, moved_between
+from dsl_core.capture.motion import TILES, Movement, moved_between
 from dsl_core.capture.proof.again.room_again import said_of_room, said_of_slight_change
 from dsl_core.capture.proof.lasting.black_light import lit_black
 from dsl_core.capture.proof.noise import Noise
@@ -45,6 +46,8 @@ TELLING_DN = 2.0
 SATURATED = 0.5
 #: Share of full scale from which on a pixel is saturated.
 FULL = 0.98
+#: Width of what such a pixel takes with it, camera pixels: the colours of a mosaic repeat every other one.
+BESIDE_PX = 5
 #: Pixels needed to say anything, and the deviations that white exceeds black by in each.
 FEWEST, LIT_SIGMAS = 12, 5.0
 #: A frame of the code shows another pattern if its pixels differ by this share of white: noise makes less.
@@ -200,10 +203,14 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     if altered:
         return Explanation(altered, is_of_all=True)
     tiles = _light_of_tiles(light.old, light.new, light.used)
-    shaded = _shaded(tiles, light.used.shape) or _lit_up(tiles, light.used.shape)
+    moved = moved_between((before.white, before.black), (now.white, now.black), sensor, is_pattern=False)
+    shaded = _shaded(tiles, light.used.shape)
+    if moved is None or not moved.is_sure:
+        # Edges of what is bright move into tiles that are dark otherwise, and light them.
+        shaded = shaded or _lit_up(tiles, light.used.shape)
     if shaded:
         return Explanation(shaded)
-    return _of_light_or_motion(before, now, sensor, light, tiles)
+    return _of_light_or_motion(before, now, sensor, light, tiles, moved)
 
 
 def _is_black_bright(before: References, now: References, sensor: Sensor) -> bool:
@@ -232,7 +239,8 @@ def _lights(before: References, now: References, sensor: Sensor) -> _Lights | No
     old, new = (each.white.astype(np.float64) - each.black for each in (before, now))
     # All of the picture but what is saturated: of bright pixels alone, a motion would dim many.
     full = FULL * sensor.full_scale_dn
-    used = (before.white < full) & (now.white < full)
+    # Beside what was saturated, a motion shows one side of its edge and hides the other.
+    used = (maximum_filter(before.white, BESIDE_PX) < full) & (now.white < full)
     noise = Noise(sensor)
     sigma = np.sqrt(noise.variance(before.white) + noise.variance(before.black))
     lit = used & (old > np.maximum(0.25 * np.percentile(old, 95), LIT_SIGMAS * sigma))
@@ -243,10 +251,14 @@ def _lights(before: References, now: References, sensor: Sensor) -> _Lights | No
 
 
 def _of_light_or_motion(
-    before: References, now: References, sensor: Sensor, light: _Lights, tiles: NDArray[np.float64]
+    before: References,
+    now: References,
+    sensor: Sensor,
+    light: _Lights,
+    tiles: NDArray[np.float64],
+    moved: Movement | None,
 ) -> Explanation:
     """What lamps, exposure, room, focus and motion have changed, of pictures that show the same otherwise."""
-    moved = moved_between((before.white, before.black), (now.white, now.black), sensor, is_pattern=False)
     if moved is None and not light.is_other:
         moved = moved_between((before.code, before.black), (now.code, now.black), sensor, is_pattern=True)
     colours = _of_colours(light.old, light.new, light.used, sensor)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, shift
 
 from dsl_core.capture.diagnosis import Diagnosis, Explanation, References, what_changed
 from dsl_core.capture.proof.verifier import FrameProof
@@ -115,6 +115,26 @@ def test_a_part_of_white_that_gained_light_is_named_and_no_colour_of_it() -> Non
     found = what_changed(before, later, SENSOR).sentence
     assert found.startswith("White has gained light in columns 64-80, rows 32-48 of the picture")
     assert "colours" not in found
+
+
+@pytest.mark.parametrize("moved_px", [0.5, 1.0])
+def test_bright_edges_that_move_into_dark_tiles_are_a_motion(moved_px: float) -> None:
+    """Beside a patch that saturates, a part of a tile is left that tells much more light, or less."""
+
+    def seen(light: float, shift_px: float) -> np.ndarray:
+        texture = 0.6 + 0.5 * gaussian_filter(np.random.default_rng(4).normal(size=(64, 96)), 1.5).clip(0)
+        texture[30:50, :58] = 8.0
+        moved = shift(gaussian_filter(texture, 1.0), (0, shift_px), order=1, mode="nearest")
+        noise = np.random.default_rng(int(8 * (light + shift_px))).normal(0, 3, moved.shape)
+        counts = SENSOR.black_level_dn + 20 + 1200 * light * moved + noise
+        return np.rint(counts).clip(0, SENSOR.full_scale_dn).astype(np.uint16)
+
+    before, later = (References(seen(1.0, px), seen(0.0, px), seen(0.5, px)) for px in (0.0, moved_px))
+    found = what_changed(before, later, SENSOR)
+    assert found.has_moved
+    assert re.match(rf"[A-Z][^.]* moved by {moved_px} ± 0.1 px", found.sentence), found.sentence
+    assert "came into" not in found.sentence
+    assert "exposure" not in found.sentence
 
 
 def test_a_plan_without_a_code_has_no_references() -> None:
