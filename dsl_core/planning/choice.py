@@ -15,11 +15,14 @@ from dsl_core.capture.preflight import find_obstacles
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sentinels, Setting, SpectralSet
-from dsl_core.model.presets import column_scale, comb_on
+from dsl_core.model.presets import PUBLISHED_PERIOD_MS, column_scale, comb_on
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.spectra import ORDERS, chain_response
 from dsl_core.planning.designed import designed_sets
 from dsl_core.planning.expected import Prediction
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.front import front
 
 if TYPE_CHECKING:
@@ -33,7 +36,9 @@ COMBS = (
     (6, 4, 64), (5, 2, 64), (6, 4, 128), (5, 3, 96), (5, 2, 80), (9, 2, 64), (9, 2, 80), (4, 3, 192),
 )  # fmt: skip
 #: Cycles and levels of the settings of a bracket; a setting twice is a repeat.
-BRACKETS = (
+Exposures = tuple[tuple[int, float], ...]
+#: Those of the published rig.
+BRACKETS: tuple[Exposures, ...] = (
     ((10, 0.2), (20, 0.8)),
     ((2, 0.2), (8, 0.8)),
     ((4, 0.2), (12, 0.8)),
@@ -126,10 +131,10 @@ def _too_slow(budget_s: float, quickest: CapturePlan, takes_s: float) -> PlanErr
     )
 
 
-def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:
-    """All combinations on a rig, the published plan first."""
+def candidate_plans(rig: Rig, longest_ms: float = math.inf) -> Iterator[CapturePlan]:
+    """All combinations on a rig whose camera exposes for at most so long, the published plan first."""
     yield CapturePlan(name="published", sentinels=Sentinels()).sized(rig.camera, rig.projector)
-    for (name, spectral), bracket in product(pattern_sets(rig).items(), BRACKETS):
+    for (name, spectral), bracket in product(pattern_sets(rig).items(), brackets_on(rig, longest_ms)):
         settings = tuple(
             Setting(exposure_ms=cycles * rig.frame_period_ms, level=level) for cycles, level in bracket
         )
@@ -145,16 +150,49 @@ def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:
         yield plan.sized(rig.camera, rig.projector)
 
 
+def brackets_on(rig: Rig, longest_ms: float) -> list[Exposures]:
+    """The brackets in whole cycles of a rig's projector, each once.
+
+    They gather as much light as on the published rig; where there is less, others that are as quick as there
+    are offered as well. One with an exposure above ``longest_ms`` is shortened as a whole.
+    """
+    times, most = light_scale(rig), longest_ms / rig.frame_period_ms
+    found: dict[Exposures, None] = {}
+    for scale, bracket in product((times, min(times, 1.0)), BRACKETS):
+        wanted = [cycles * scale * PUBLISHED_PERIOD_MS / rig.frame_period_ms for cycles, _ in bracket]
+        share = min(1.0, most / max(wanted))
+        whole = [max(int(min(round(cycles * share), most)), 1) for cycles in wanted]
+        found[tuple((cycles, level) for cycles, (_, level) in zip(whole, bracket, strict=True))] = None
+    return list(found)
+
+
+def light_scale(rig: Rig) -> float:
+    """How many times as long as on the published rig first orders take to fill the sensor, a power of two."""
+    return float(2.0 ** round(math.log2(_range_per_ms(published_rig()) / _range_per_ms(rig))))
+
+
+def _range_per_ms(rig: Rig) -> float:
+    """Share of the sensor's range that white in a first order fills in a ms, in the brightest colour."""
+    nm, sensor = WavelengthGrid().centres_nm, rig.sensor
+    light_dn = max(chain_response(rig, order, nm).sum((1, 2)).max() for order in ORDERS)
+    shading = (rig.reference_distance_mm / rig.usual_depth_mm) ** 2
+    return float(light_dn * shading / (sensor.full_scale_dn - sensor.black_level_dn))
+
+
 def possible_plans(devices: DeviceRig, rig: Rig) -> list[CapturePlan]:
     """The combinations that devices of this calibration can capture; raises `PlanError` if there is none."""
     # Whether the devices are still as they were calibrated is the scan's question, and can be mended.
-    bare = replace(devices, calibration=None)
-    found = [(plan, find_obstacles(bare, plan)) for plan in candidate_plans(rig)]
+    bare, camera = replace(devices, calibration=None), devices.camera.info
+    found = [(plan, find_obstacles(bare, plan)) for plan in candidate_plans(rig, camera.exposure_range_ms[1])]
     able = [plan for plan, obstacles in found if not obstacles]
     if not able:
+        plan, obstacles = min(found, key=lambda each: len(each[1]))
+        advice = "Use a camera that exposes for a colour cycle of the projector or longer."
+        if plan != plan.sized(camera, devices.projector.info):
+            advice = "Name a rig and a calibration of one kind."
         raise PlanError(
             f"None of {len(found)} plans for the calibration {rig.name!r} is possible on the rig"
-            f" {devices.name!r}: {'; '.join(found[0][1])}. Name a rig and a calibration of one kind."
+            f" {devices.name!r}: {'; '.join(obstacles)}. {advice}"
         )
     return able
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,8 +20,10 @@ from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.planning.choice import (
+    BRACKETS,
     LINES,
     Weighed,
+    brackets_on,
     candidate_plans,
     choose,
     pareto,
@@ -122,24 +125,53 @@ def _limited(longest_ms: float) -> DeviceRig:
     return rig
 
 
-def test_only_plans_that_the_rig_can_capture_are_weighed() -> None:
-    with _limited(200) as devices:
+@pytest.mark.parametrize("longest_ms", [50.0, 100.0, 200.0])
+def test_plans_for_a_camera_expose_no_longer_than_it_can(longest_ms: float) -> None:
+    with _limited(longest_ms) as devices:
         assert devices.calibration is not None
         able = possible_plans(devices, devices.calibration)
-        everything = list(candidate_plans(devices.calibration))
-        assert 0 < len(able) < len(everything)
-        assert {plan.name for plan in able} == {
-            plan.name for plan in everything if max(each.exposure_ms for each in plan.settings) <= 200
-        }
         assert all(not find_obstacles(devices, plan) for plan in able)
+    sets = {plan.spectral for plan in candidate_plans(published_rig())}
+    # All patterns are left, at exposures that keep their ratio as far as whole cycles can.
+    assert {plan.spectral for plan in able} == sets
+    assert len({plan.name for plan in able}) == len(able)
+    bracket = brackets_on(published_rig(), longest_ms)[0]
+    assert bracket[1][0] == int(longest_ms / published_rig().frame_period_ms)
+    assert bracket[0][0] == pytest.approx(bracket[1][0] / 2, abs=0.5)
+
+
+@pytest.mark.parametrize("rate_hz", [24.0, 50.0, 120.0])
+def test_another_projector_exposes_as_long_in_whole_cycles_of_its_own(rate_hz: float) -> None:
+    rig = published_rig().model_copy(update={"frame_period_ms": 1000 / rate_hz})
+    settings = [plan.settings for plan in candidate_plans(rig)][1]
+    assert [each.exposure_ms for each in settings] == pytest.approx([500 / 3, 1000 / 3], abs=500 / rate_hz)
+    assert all((each.exposure_ms * rate_hz / 1000) % 1 == pytest.approx(0) for each in settings)
+
+
+def test_exposures_follow_the_light_and_the_range_of_the_sensor() -> None:
+    rig = published_rig()
+    assert brackets_on(rig, math.inf) == list(BRACKETS)
+    brighter = rig.model_copy(update={"white_scale": 8 * rig.white_scale})
+    assert brackets_on(brighter, math.inf)[0] == ((1, 0.2), (2, 0.8))
+    quickest = [min(plan.duration_s(50.0) for plan in candidate_plans(each)) for each in (rig, brighter)]
+    assert quickest[1] < 0.75 * quickest[0]
+    # Where there is less light, quick plans are still there.
+    darker = rig.model_copy(update={"white_scale": rig.white_scale / 8})
+    assert set(BRACKETS) | {((80, 0.2), (160, 0.8))} < set(brackets_on(darker, math.inf))
+    deeper = {"bit_depth": 16, "black_level_dn": 16 * rig.sensor.black_level_dn}
+    sixteen = {"sensor": rig.sensor.model_copy(update=deeper), "white_scale": 16 * rig.white_scale}
+    assert brackets_on(rig.model_copy(update=sixteen), math.inf) == list(BRACKETS)
+    near = {"reference_distance_mm": 2 * rig.reference_distance_mm}
+    assert brackets_on(rig.model_copy(update=near), math.inf)[0] == ((2, 0.2), (5, 0.8))
 
 
 def test_that_no_plan_is_possible_is_told() -> None:
     with _limited(1) as devices:
         assert devices.calibration is not None
-        with pytest.raises(PlanError, match=r"None of \d+ plans .* camera supports 0\.1 to 1 ms"):
+        told = r"None of \d+ plans .* 16\.6667 ms, but the camera supports 0\.1 to 1 ms\. Use a camera that"
+        with pytest.raises(PlanError, match=told):
             possible_plans(devices, devices.calibration)
-        with pytest.raises(PlanError, match=r"'twin': the plan is for a camera of .* 112 x 72"):
+        with pytest.raises(PlanError, match=r"'twin': the plan is for a camera of .* 112 x 72.* of one kind"):
             possible_plans(devices, published_rig())
 
 
