@@ -194,7 +194,11 @@ def test_a_width_that_nothing_tells_is_asked_for(
             ("set", "--guess", "--from-projector"),
             "set is a folder; --from-projector belongs to a stereo",
         ),
-        (("set", "--unit-mm", "1000", "--led-curves", "a.csv"), "--led-curves, --unit-mm belong to a stereo"),
+        (
+            ("set", "--camera-curves", "a", "--led-curves", "b"),
+            "--camera-curves, --led-curves belong to a stereo",
+        ),
+        (("set", "--unit-mm", "1000"), "has no lengths; --unit-mm belongs to a stereo file or a published"),
         (
             ("c.json", "--encoding", "srgb"),
             "is a stereo file; --encoding belongs to a folder of",

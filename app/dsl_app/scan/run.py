@@ -71,7 +71,9 @@ class CalibrationBox(QGroupBox):
         self._mark(self._state.calibration.value)
 
     def _mark(self, chosen: CalibrationChoice) -> None:
-        self.choice.setCurrentIndex(self.choice.findData(chosen.key))
+        # A resumed scan has one of its own alone.
+        own = self._state.interrupted.value is not None
+        self.choice.setCurrentIndex(0 if own else self.choice.findData(chosen.key))
 
     def _choose(self, index: int) -> None:
         self._controller.plans.choose_calibration(self._state.calibrations.value[index])

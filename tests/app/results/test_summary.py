@@ -81,8 +81,8 @@ def test_a_person_who_waits_for_a_result_is_told_so(qtbot: QtBot) -> None:
 
 
 def result(**attributes: object) -> ResultArrays:
-    arrays = {"depth_mm": np.zeros((48, 64)), "reflectance": np.zeros((2, 48, 64))}
-    return ResultArrays(Path("/scans/leaf.zarr"), np.array([500.0, 600.0]), arrays, attributes)
+    arrays = {"depth_mm": np.zeros((48, 64)), "reflectance": np.zeros((24, 48, 64))}
+    return ResultArrays(Path("/scans/leaf.zarr"), np.arange(430.0, 661.0, 10.0), arrays, attributes)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_the_page_shows_a_result_an_offer_or_the_welcome(
 
 def test_the_head_tells_size_bands_time_and_path() -> None:
     found = summarise(result(captured="2026-05-04T09:30:12"), None, "")
-    assert found.about == "64 × 48 px · 2 bands · 2026-05-04 09:30 · /scans/leaf.zarr"
+    assert found.about == "64 × 48 px · 24 bands · 2026-05-04 09:30 · /scans/leaf.zarr"
     assert found.details == "/scans/leaf.zarr"
     depth = ResultArrays(Path("a.zarr"), np.empty(0), {"depth_mm": np.zeros((48, 64))})
     assert summarise(depth, None, "").about == "64 × 48 px · depth only · a.zarr"
@@ -117,7 +117,7 @@ def test_the_head_tells_size_bands_time_and_path() -> None:
 def test_the_head_tells_to_what_share_the_scale_of_reflectance_is_known() -> None:
     fit = Fit(scale_rel_std=0.025, scale="Scale of reflectance: known to 4.9%.")
     found = summarise(result(fit=fit.model_dump_json()), None, "")
-    assert found.about == "64 × 48 px · 2 bands · scale of reflectance known to 4.9 % · /scans/leaf.zarr"
+    assert found.about == "64 × 48 px · 24 bands · scale of reflectance known to 4.9 % · /scans/leaf.zarr"
     assert fit.scale in found.details
     # It is so of every scan, and no reason for a warning.
     assert found.warning == found.advice == ""

@@ -47,7 +47,7 @@ def test_errors_that_all_columns_share_are_left_out_where_they_are_not_wanted(
 @pytest.mark.parametrize(("depth_mm", "share"), [(1000.0, 1.0), (1100.0, 1.0), (2400.0, 0.0)])
 def test_a_target_beside_the_depths_of_a_rig_is_one(depth_mm: float, share: float) -> None:
     levels = tuple((tuple(map(float, light)),) * published_rig().projector.width_px for light in LIGHTS)
-    plan = CapturePlan(code=GrayCode(rows=False), spectral=Columns(levels=levels))
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=Columns.model_validate({"levels": levels}))
     devices, scan = twin_scan(plan, size="64x42", scene="plane", depth_mm=str(depth_mm), film="off")
     rig = devices.calibration
     assert rig is not None

@@ -89,7 +89,7 @@ def test_separate_planes_are_read_right_or_refused(
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_pictures_whose_zero_is_white_are_read_as_positives(tmp_path: Path, kind: type) -> None:
-    grey = (RGB[..., 0] >> (8 if kind is np.uint8 else 0)).astype(kind)
+    grey: NDArray[np.generic] = (RGB[..., 0] >> (8 if kind is np.uint8 else 0)).astype(kind)
     content = bytearray(tiff(np.iinfo(kind).max - grey))
     at = struct.unpack_from("<I", content, 4)[0] + 2 + 4 * 12
     assert struct.unpack_from("<HHII", content, at)[0] == 262

@@ -59,7 +59,14 @@ def test_pixels_see_some_of_each_uniform_colour(
     of_white = np.array([[0.56, 0.04, 0.02], [0.27, 0.86, 0.24], [0.17, 0.1, 0.74]])
     lights = (*np.eye(3), np.ones(3))
     levels = tuple((tuple(map(float, light)),) * WIDE for light in lights)
-    scan = Known(PLAN.model_copy(update={"spectral": Columns(levels=levels)}), None, 12, "RGGB", False, True)
+    scan = Known(
+        PLAN.model_copy(update={"spectral": Columns.model_validate({"levels": levels})}),
+        None,
+        12,
+        "RGGB",
+        False,
+        True,
+    )
     channel, _ = known_columns(monkeypatch)
     lines = [shot for shot in scan.shots if shot.role == "spectral" and shot.setting == 0]
     shown = [lights[i] for i in ((0, 3, 2, 3) if white_for_green else range(4))]
