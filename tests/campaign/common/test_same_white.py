@@ -145,6 +145,25 @@ def test_lamps_that_flicker_do_not_decide(bench: Scanned, factor: float) -> None
             require_same_white(here, STEP)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_of_a_faint_filter_is_no_other_exposure(
+    bench: Scanned, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    """Lines of a third of a DN under noise of 2.5 DN, all against one picture of black."""
+    rng, read = np.random.default_rng(seed), Scanned.read
+    monkeypatch.setattr(Scanned, "code", NoCode())
+
+    def noisy(self: Scanned, shot: Shot) -> np.ndarray:
+        return np.uint16(np.rint(read(self, shot) + 20.0 + 2.5 * rng.standard_normal((60, 80))))
+
+    monkeypatch.setattr(Scanned, "read", noisy)
+    faint = WhiteLevel(RATE, np.full(3, RATE), 0.0, False, np.full((6, 8), 0.3 * RATE), 1.0)
+    keep_white(bench, STEP, faint)
+    require_same_white(seen(bench, 0.3), STEP)
+    with pytest.raises(CalibrationError, match=r"white of the scan has [12]\.[0-9]+ times"):
+        require_same_white(seen(bench, 0.6), STEP)
+
+
 def test_a_room_lit_for_good_after_black_is_told(bench: Scanned, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Scanned, "code", NoCode())
     read = Scanned.read
