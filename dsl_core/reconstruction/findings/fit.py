@@ -16,8 +16,8 @@ from dsl_core.reconstruction.calibration_age import CHANGED_REL_STD
 from dsl_core.reconstruction.findings.band_findings import band_findings, line_width_nm
 from dsl_core.reconstruction.findings.flag_findings import SpectralCounts, share_findings
 from dsl_core.reconstruction.findings.known_causes import (
+    with_changes_known,
     with_finer_bands_first,
-    without_drift_that_is_none,
     without_effects,
 )
 from dsl_core.reconstruction.findings.line_edges import edge_findings
@@ -55,7 +55,7 @@ def fit_of(
     if followed is not None and is_coloured:
         off_px = orders_off_px(rig)
         of_model = cause_findings(followed.probe, followed.balanced, followed.motion, off_px, followed.turn)
-        findings += without_drift_that_is_none(of_model, [*findings])
+        findings += with_changes_known(of_model, [*findings])
     turn = None if followed is None else followed.turn
     common = [rig.white_scale_rel_std, rig.reference_rel_std, 0.0 if turn is None else turn.level_rel_std]
     findings = with_finer_bands_first(without_effects(findings), grid.step_nm)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.findings.band_findings import WIDE_BANDS
@@ -12,11 +14,12 @@ from dsl_core.reconstruction.findings.model_findings import (
     COLOUR_GAINS,
     COLOURS_DISAGREE,
     DRIFT_LEFT,
+    EVENNESS,
     GAIN_OF_BOTH,
     MISFIT,
     ORDERS_APART,
 )
-from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
+from dsl_core.reconstruction.light.told import BLACK_AGAIN, COLOUR, DRIFT, STEP
 from dsl_core.reconstruction.spectral.colour_sites import MOSAIC
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
@@ -73,33 +76,42 @@ def with_finer_bands_first(findings: Iterable[FitFinding], step_nm: float) -> li
         return list(findings)
     first = (
         f"Reconstruct with bands of {usual_nm:g} nm first: ones of {step_nm:g} nm may be too wide for these"
-        " spectra. If it stays: "
+        " spectra."
     )
-    return [
-        each.model_copy(update={"advice": first + each.advice[0].lower() + each.advice[1:]})
-        if each.significant
-        and each.part != "film"
-        and each.name in BY_WIDE_BANDS | {GAIN_OF_BOTH, ORDERS_APART}
-        else each
-        for each in findings
-    ]
+    names = BY_WIDE_BANDS | {GAIN_OF_BOTH, ORDERS_APART}
+    # Without a film there is no light in any band.
+    return [_after(first, each) if each.name in names and each.part != "film" else each for each in findings]
 
 
-def without_drift_that_is_none(
-    findings: Iterable[FitFinding], earlier: Iterable[FitFinding]
-) -> list[FitFinding]:
-    """The same findings on the model, where white and sums of lines, ``earlier``, say how the light drifted.
+def with_changes_known(findings: Iterable[FitFinding], earlier: Iterable[FitFinding]) -> list[FitFinding]:
+    """The same findings on the model, where white, black and sums of lines, ``earlier``, say what changed.
 
-    Frames follow it. Surfaces of few colours, seen by one order early and by the other late, may seem to ask
-    for more.
+    A pixel is lit by one order early and by the other late, by lines that run over the frame. So frames that
+    follow a drift may seem to ask for more of it on surfaces of few colours; a black that changes, which is
+    much of faint orders, looks like a drift or another response; and light that changes looks uneven over the
+    frame.
     """
-    course = next((each for each in earlier if each.name == DRIFT and each.std is not None), None)
-    if course is None or course.std is None:
-        return list(findings)
-    most = max(MOST_LEFT, SIGMAS * course.std)
-    return [
-        each.model_copy(update={"significant": False})
-        if each.name == DRIFT_LEFT and abs(each.value) > most
-        else each
-        for each in findings
+    known = list(earlier)
+    told = {each.name for each in known if each.significant}
+    course = next((each for each in known if each.name == DRIFT and each.std is not None), None)
+    most = np.inf if course is None or course.std is None else max(MOST_LEFT, SIGMAS * course.std)
+
+    def is_explained(each: FitFinding) -> bool:
+        if each.name == DRIFT_LEFT:
+            return BLACK_AGAIN in told or abs(each.value) > most
+        return each.name == EVENNESS and not told.isdisjoint((DRIFT, STEP, COLOUR))
+
+    found = [
+        each.model_copy(update={"significant": False}) if is_explained(each) else each for each in findings
     ]
+    black = "Scan again with steady black and light first: what black has changed by may be all of it."
+    by_black = {GAIN_OF_BOTH, ORDERS_APART} if BLACK_AGAIN in told else set()
+    return [_after(black, each) if each.name in by_black else each for each in found]
+
+
+def _after(first: str, finding: FitFinding) -> FitFinding:
+    """A finding that matters, with advice on what to do before that."""
+    if not finding.significant:
+        return finding
+    advice = f"{first} If it stays: {finding.advice[0].lower()}{finding.advice[1:]}"
+    return finding.model_copy(update={"advice": advice})

@@ -51,6 +51,8 @@ TURNED = "turn of camera or projector"
 LEAST_DEPTH_SHARE = 0.001
 #: Name of what is left of a drift of the light.
 DRIFT_LEFT = "change of the light over the scan"
+#: Name of what is found of the light from the middle of the projector's frame to its sides.
+EVENNESS = "evenness of the projector's light"
 #: Name of what is found of the second orders.
 SECONDS = "light of the second orders"
 #: Names of what is found of the colours of the camera, and of all that frames and model differ by.
@@ -154,7 +156,7 @@ def _evenness(probe: Probe) -> Iterator[FitFinding]:
         return
     found = FitFinding.judged(
         "light",
-        "evenness of the projector's light",
+        EVENNESS,
         (light.change, light.std),
         "1",
         MOST_UNEVEN,

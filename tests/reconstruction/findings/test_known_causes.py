@@ -8,20 +8,21 @@ from dsl_core.model.fit import Fit, FitFinding
 from dsl_core.reconstruction.findings.band_findings import band_findings
 from dsl_core.reconstruction.findings.flag_findings import POOR_AREAS, POOR_FIT, SpectralCounts
 from dsl_core.reconstruction.findings.known_causes import (
+    with_changes_known,
     with_finer_bands_first,
     with_known_causes,
-    without_drift_that_is_none,
     without_effects,
 )
 from dsl_core.reconstruction.findings.model_findings import (
     COLOUR_GAINS,
     COLOURS_DISAGREE,
     DRIFT_LEFT,
+    EVENNESS,
     GAIN_OF_BOTH,
     MISFIT,
     ORDERS_APART,
 )
-from dsl_core.reconstruction.light.told import BLACK_AGAIN, DRIFT
+from dsl_core.reconstruction.light.told import BLACK_AGAIN, COLOUR, DRIFT, STEP
 from dsl_core.reconstruction.spectral.colour_sites import MOSAIC
 from dsl_core.reconstruction.spectral.order_balance import BALANCE
 
@@ -53,8 +54,28 @@ def test_light_whose_course_is_known_has_not_drifted_much_beyond_it(
         if course_std is None
         else [FitFinding.judged("light", DRIFT, (0.01, course_std), "1", 0.006, "It drifted.", "Wait.")]
     )
-    found = without_drift_that_is_none([seen], known)
+    found = with_changes_known([seen], known)
     assert [each.significant for each in found] == [is_told]
+
+
+@pytest.mark.parametrize("black_dn", [0.4, 0.8])
+def test_what_a_changed_black_looks_like_is_no_fault_of_lamp_or_response(black_dn: float) -> None:
+    """Sun that rose while lines were captured was told as a lamp that had not warmed up."""
+    model = [finding(name, -0.6, "It has changed.") for name in (DRIFT_LEFT, GAIN_OF_BOTH, ORDERS_APART)]
+    found = with_changes_known(model, [finding(BLACK_AGAIN, black_dn, "Black changed.")])
+    has_changed = black_dn > 0.5
+    assert [each.significant for each in found] == [not has_changed, True, True]
+    for each in found[1:]:
+        assert each.advice.startswith("Scan again with steady black and light first") == has_changed
+
+
+@pytest.mark.parametrize("name", [DRIFT, STEP, COLOUR, BLACK_AGAIN])
+@pytest.mark.parametrize("change", [0.4, 0.8])
+def test_light_that_changed_in_time_is_not_uneven_over_the_frame(name: str, change: float) -> None:
+    """Lines run over the frame in time: a lamp 10 % dimmer from the middle of a scan on looked uneven."""
+    seen = finding(EVENNESS, 0.8, "The light changes to the sides.")
+    found = with_changes_known([seen], [finding(name, change, "It changed.")])
+    assert [each.significant for each in found] == [change < 0.5 or name == BLACK_AGAIN]
 
 
 @pytest.mark.parametrize("name", [POOR_AREAS, POOR_FIT, COLOUR_GAINS, COLOURS_DISAGREE, MISFIT])
