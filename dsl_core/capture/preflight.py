@@ -32,7 +32,11 @@ def fit_plan(plan: CapturePlan, rig: DeviceRig, *, keeps_patterns: bool = False)
 
 def find_obstacles(rig: DeviceRig, plan: CapturePlan) -> list[str]:
     """Everything that keeps the rig from doing the plan, one clause each; empty when it can start."""
-    return [*_sizes(rig, plan), *_exposures(rig, plan), *_calibration(rig)]
+    return [
+        *_sizes(rig, plan),
+        *exposure_obstacles(rig.camera.info.exposure_range_ms, plan),
+        *_calibration(rig),
+    ]
 
 
 def find_remarks(calibration: Rig | None) -> list[str]:
@@ -66,8 +70,9 @@ def _sizes(rig: DeviceRig, plan: CapturePlan) -> Iterator[str]:
             )
 
 
-def _exposures(rig: DeviceRig, plan: CapturePlan) -> Iterator[str]:
-    shortest, longest = rig.camera.info.exposure_range_ms
+def exposure_obstacles(range_ms: tuple[float, float], plan: CapturePlan) -> Iterator[str]:
+    """A clause for each setting that a camera which exposes in this range cannot take."""
+    shortest, longest = range_ms
     for i, setting in enumerate(plan.settings):
         if not shortest <= setting.exposure_ms <= longest:
             yield (

@@ -108,7 +108,7 @@ def forecast(stage: Stage) -> None:
     control = scan.page.forecast._controller
     assert isinstance(control, ForecastController)
     # Every sixth plan shows what all of them would.
-    control._candidates = lambda rig: islice(usual_candidates(rig), 0, None, 6)
+    control._candidates = lambda basis: islice(usual_candidates(basis), 0, None, 6)
     control.begin()
     stage.wait(lambda: len(control.state.points.value) > 2)
     stage.shoot("under-way")

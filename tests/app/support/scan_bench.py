@@ -98,7 +98,7 @@ def make_forecast(
         bench.notifier,
         folder,
         automatic,
-        lambda rig: (CapturePlan(name="published", sentinels=Sentinels()), COMB),
+        lambda basis: (CapturePlan(name="published", sentinels=Sentinels()), COMB),
     )
 
 

@@ -17,7 +17,6 @@ from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.errors import DslError, PlanError
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ class ForecastController:
         notifier: Notifier,
         folder: Path,
         automatic: bool = False,
-        candidates: Callable[[Rig], Iterable[CapturePlan]] = usual_candidates,
+        candidates: Callable[[ForecastBasis], Iterable[CapturePlan]] = usual_candidates,
     ) -> None:
         self.state, self._scan, self._rig, self._plans = state, scan, rig, plans
         self._runner, self._notifier, self._folder = runner, notifier, folder
@@ -84,8 +83,9 @@ class ForecastController:
         known = self._plans.calibration
         if known is None:
             return None
-        scan = self._scan
-        return ForecastBasis(known, scan.latency_ms.value, scan.period_ms.value, self.state.look.value)
+        scan, camera = self._scan, self._rig.camera
+        basis = ForecastBasis(known, scan.latency_ms.value, scan.period_ms.value, self.state.look.value)
+        return basis if camera is None else replace(basis, exposure_range_ms=camera.exposure_range_ms)
 
     def look(self, result: Path | None) -> None:
         """Predict for the scene of a result, or for a Color Checker."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -16,6 +17,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS, on_columns, on_cycles
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
+from dsl_core.words import sentence
 
 if TYPE_CHECKING:
     from dsl_core.planning.expected import Prediction
@@ -24,13 +26,6 @@ if TYPE_CHECKING:
 
 #: Interval at which to check whether other work has ended, s.
 LOOK_S = 0.1
-
-
-def usual_candidates(rig: Rig) -> Iterable[CapturePlan]:
-    """All plans that the planner considers."""
-    from dsl_core.planning.choice import candidate_plans
-
-    return candidate_plans(rig)
 
 
 @dataclass(frozen=True)
@@ -45,13 +40,15 @@ class Refused:
 class ForecastBasis:
     """What predictions are based on: a calibration, the projector's latency and frame period, and a scene.
 
-    ``look`` is a result of the scene; None for a Color Checker.
+    ``look`` is a result of the scene; None for a Color Checker. Plans beyond what the camera exposes for are
+    refused.
     """
 
     rig: Rig
     latency_ms: float
     period_ms: float
     look: Path | None = None
+    exposure_range_ms: tuple[float, float] = (0.0, math.inf)
 
     @property
     def scene(self) -> str:
@@ -62,6 +59,13 @@ class ForecastBasis:
             return f"{self.look} {self.look.stat().st_mtime_ns}"
         except OSError:  # reported when it is read
             return str(self.look)
+
+
+def usual_candidates(basis: ForecastBasis) -> Iterable[CapturePlan]:
+    """All plans that the planner considers."""
+    from dsl_core.planning.choice import candidate_plans
+
+    return candidate_plans(basis.rig, basis.exposure_range_ms[1])
 
 
 class ForecastJob:
@@ -76,7 +80,7 @@ class ForecastJob:
         self,
         rigging: ForecastBasis,
         folder: Path,
-        candidates: Callable[[Rig], Iterable[CapturePlan]] | None,
+        candidates: Callable[[ForecastBasis], Iterable[CapturePlan]] | None,
         must_wait: Callable[[], bool],
         all_plans: bool = False,
     ) -> None:
@@ -116,7 +120,7 @@ class ForecastJob:
         presets = {identity(p): key for key, p in self._presets()}
         seen: dict[int, CapturePlan] = {}
         if self._candidates is not None:
-            for plan in (*(p for _, p in self._presets()), *self._candidates(rig)):
+            for plan in (*(p for _, p in self._presets()), *self._candidates(self.rigging)):
                 key = identity(plan)
                 if self._all or key in presets or store.find(plan.sized(rig.camera, rig.projector)):
                     seen.setdefault(key, plan)
@@ -158,7 +162,12 @@ class ForecastJob:
             self._news.append(news)
 
     def _of(self, plan: CapturePlan, store: PredictionStore, preset: str) -> ForecastPoint | Refused:
+        from dsl_core.capture.preflight import exposure_obstacles
+
         rig = self.rigging.rig
+        obstacles = list(exposure_obstacles(self.rigging.exposure_range_ms, plan))
+        if obstacles:
+            return Refused(plan, f"{sentence('; '.join(obstacles))} Choose exposures in this range.")
         sized = plan.sized(rig.camera, rig.projector)
         known = store.find(sized)
         if known is not None:

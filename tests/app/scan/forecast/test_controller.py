@@ -1,16 +1,19 @@
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from shutil import copytree
 
 import pytest
 from dsl_app.connection.state import RigChoice
 from dsl_app.scan.forecast.controller import NO_CALIBRATION, ForecastController
-from dsl_app.scan.forecast.job import ForecastBasis, ForecastJob
+from dsl_app.scan.forecast.job import ForecastBasis, ForecastJob, usual_candidates
 from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity, plan_title
 from dsl_app.scan.state import Phase
 from dsl_app.shared.jobs.base import Job
 
+from dsl_core.capture.preflight import exposure_obstacles
 from dsl_core.capture.runner import State, Status
 from dsl_core.errors import PlanError
 from dsl_core.io.result.result_file import load_result, save_result
@@ -66,7 +69,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 @pytest.mark.slow
 def test_the_planner_is_asked(bench: ScanBench, tmp_path: Path) -> None:
     work = ForecastJob(
-        ForecastBasis(bench.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False
+        ForecastBasis(bench.calibration, 50.0, 1000 / 60), tmp_path, lambda basis: (), lambda: False
     )
     found = work._of(COMB, PredictionStore(tmp_path, bench.calibration, 50.0), "")
     assert isinstance(found, ForecastPoint)
@@ -132,6 +135,27 @@ def test_an_impossible_plan_says_why_until_it_is_left(
     assert "no spectral patterns" in control.state.refusal.value
     bench.undo.undo()
     assert [control.state.refusal.value] == [""]
+
+
+def test_plans_that_the_camera_cannot_take_are_not_offered(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    info = replace(devices.camera.info, exposure_range_ms=(0.02, 200.0))
+    devices.camera._info = info  # type: ignore[attr-defined]
+    control = forecast(bench, tmp_path)
+    control._candidates = lambda basis: islice(usual_candidates(basis), 12)
+    control.predict_all()
+    points = control.state.points.value
+    assert len(points) > 5
+    assert not [obstacle for each in points for obstacle in exposure_obstacles((0.02, 200.0), each.plan)]
+    for budget_s in (30, 60, 600):
+        control.answer(budget_s=budget_s)
+        assert bench.state.facts.value.obstacles == ()
+    bench.scans.plans.choose_preset("coarse")
+    assert control.state.current.value is None
+    assert "exposes for 333.333 ms, but the camera supports 0.02 to 200 ms" in control.state.refusal.value
 
 
 def test_wishes_choose_a_plan_or_say_what_could_be_had(
