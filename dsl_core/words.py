@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+from numbers import Real
 
 
 def counted(count: int, one: str, many: str = "") -> str:
@@ -32,6 +33,15 @@ def in_groups(value: float, digits: int = 0) -> str:
     (['21', '402.4'], '999')
     """
     return f"{value:,.{digits}f}".replace(",", chr(0xA0))
+
+
+def as_given(value: object) -> str:
+    """What was given, in an error: a number in few digits, anything else as Python writes it.
+
+    >>> as_given(2.0), as_given("2")
+    ('2', "'2'")
+    """
+    return f"{value:g}" if isinstance(value, Real) else repr(value)
 
 
 def sentence(clause: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.evaluation.marks import left_of_variance
 from dsl_core.model.result import SPECTRUM_INVALID, Flag
 from dsl_core.model.spectral import at_bands
+from dsl_core.words import as_given
 
 Floats = NDArray[np.float64]
 Cube = NDArray[np.float32] | NDArray[np.float64]
@@ -110,9 +112,10 @@ def classes_of_library(
     ``width_nm`` is how wide the bands are, as `at_bands` needs it. Raises `CalibrationError` when no entry
     covers the bands, or for an error that is none.
     """
-    if not 0 <= relative_error < 1:
+    if not isinstance(relative_error, Real) or not 0 <= relative_error < 1:
         raise CalibrationError(
-            f"The error of a library is a share from 0 to 1, not {relative_error:g}. Give 0.02 for 2 %."
+            f"The error of a library is a share from 0 to 1, not {as_given(relative_error)}."
+            " Give 0.02 for 2 %."
         )
     members: dict[str, list[Member]] = {group: [] for group in library.groups}
     notes = []

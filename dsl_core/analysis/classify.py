@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -25,7 +26,7 @@ from dsl_core.analysis.mark_colours import Ground, mark_colour
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.uncertainty import DECIDED_FROM
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.words import counted
+from dsl_core.words import as_given, counted
 
 Cube = NDArray[np.float32] | NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -65,8 +66,10 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name, given in (("worst", self.worst), ("margin", self.margin)):
-            if not 0 <= given < math.inf:
-                raise DecodeError(f"The limit {name!r} must be a number of at least 0, not {given:g}.")
+            if not isinstance(given, Real) or not 0 <= given < math.inf:
+                raise DecodeError(
+                    f"The limit {name!r} must be a number of at least 0, not {as_given(given)}."
+                )
 
     @classmethod
     def chosen(cls, measure: Measure, worst: float | None, margin: float | None) -> Limits:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from dsl_core.api import FilePath, path_of
-from dsl_core.api.places import Place, place_mask, require_picture
+from dsl_core.api.places import Place, as_array, masks_of, require_picture
 from dsl_core.errors import DecodeError
 from dsl_core.model.attributes import stated_band_width_nm
 from dsl_core.model.result_order import with_axes
@@ -67,10 +67,11 @@ def classify(
     require_picture(result)
     require_spectra(result)
     result = with_axes(result)
-    if library is None and not pins:
+    masks = {} if pins is None else masks_of(result, pins)
+    if library is None and not masks:
         raise DecodeError("There is nothing to compare with. Give a library of spectra, pins, or both.")
     if range_nm is not None:
-        result = within_nm(result, *range_nm)
+        result = within_nm(result, *_range(range_nm))
     result, missing = with_known_bands(result)
     classes: list[SpectralClass] = []
     notes: list[str] = list(missing)
@@ -82,8 +83,8 @@ def classify(
         found, left_out = classes_of_library(read, nm, library_error, width_nm)
         classes += found
         notes += [*read.notes, *left_out]
-    if pins:
-        classes += classes_of_masks(result, {name: place_mask(result, p, name) for name, p in pins.items()})
+    if masks:
+        classes += classes_of_masks(result, masks)
     chosen = Measure(measure)
     limits = Limits.chosen(chosen, worst, margin)
     known, doubts = known_classes(classes, result.get("reflectance_std"))
@@ -114,6 +115,13 @@ def _require_choice(name: str, given: object, choices: Sequence[str]) -> None:
         raise DecodeError(f"The {name} of a classification is {' or '.join(choices)}, not {given!r}.")
 
 
+def _range(given: object) -> tuple[float, float]:
+    values = as_array(given)
+    if values.shape != (2,) or values.dtype.kind not in "iuf":
+        raise DecodeError(f"range_nm is two wavelengths in nm, such as (450, 650); given {given!r}.")
+    return float(values[0]), float(values[1])
+
+
 def _or_nan(value: float | None) -> float:
     return float("nan") if value is None else value
 
@@ -137,9 +145,8 @@ def colours(
     from dsl_core.analysis.places import spectra_of_masks
 
     require_picture(result)
-    result, lights = with_axes(result), [lights] if isinstance(lights, str) else lights
-    masks = {name: place_mask(result, place, name) for name, place in pins.items()}
-    spectra = spectra_of_masks(result, masks)
+    result, lights = with_axes(result), _names_of_lights(lights)
+    spectra = spectra_of_masks(result, masks_of(result, pins))
     found = colours_of(spectra, result["wavelength_nm"].values, lights, reference)
     shape = (len(lights), len(spectra))
     over = ("light", "place")
@@ -151,5 +158,12 @@ def colours(
         for name in ("delta_e", "delta_e_std"):
             values = [getattr(c, name) or 0.0 for c in found]
             variables[name] = (over, np.array(values).reshape(shape))
-    coords = {"light": list(lights), "place": list(spectra), "component": ["L*", "a*", "b*"]}
+    coords = {"light": lights, "place": list(spectra), "component": ["L*", "a*", "b*"]}
     return xr.Dataset(variables, coords=coords).transpose("place", "light", ...)
+
+
+def _names_of_lights(given: object) -> list[str]:
+    names = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+    if not names or not all(isinstance(each, str) for each in names):
+        raise DecodeError(f"Lights are given by names, one or several, such as 'D65'; given {given!r}.")
+    return names

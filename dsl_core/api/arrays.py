@@ -88,7 +88,7 @@ def depth_of_columns(calibration: Rig | GeometryCalibration, column_px: ArrayLik
 
     ``calibration`` is what `load_calibration` or `calibrate_geometry` returns; ``column_px`` (rows, columns)
     has the camera's size. Each camera ray meets the plane of its projector column. Raises `DecodeError` for
-    another size.
+    another size, and `CalibrationError` for what is no calibration.
     """
     from dsl_core.workflows import stacks
 

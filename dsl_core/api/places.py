@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -37,7 +37,7 @@ def place_mask(result: xr.Dataset, place: Place, name: str = "The region") -> ND
     if numbers is None or len(numbers) not in (2, 4):
         raise DecodeError(
             f"{name}: a place is a mask of {len(rows)} x {len(columns)}, a pixel x, y, or x, y, width,"
-            f" height in whole pixels; given {place!r}."
+            f" height in whole pixels; given {repr(place).splitlines()[0]}."
         )
     x, y, width, height = (*numbers, 1, 1)[:4]
     inside_y, inside_x = (rows >= y) & (rows < y + height), (columns >= x) & (columns < x + width)
@@ -47,6 +47,15 @@ def place_mask(result: xr.Dataset, place: Place, name: str = "The region") -> ND
             f" ({extent_of(result)}). Choose a place inside it."
         )
     return np.asarray(inside_y[:, None] & inside_x)
+
+
+def masks_of(result: xr.Dataset, pins: Mapping[str, Place]) -> dict[str, NDArray[np.bool_]]:
+    """Masks (rows, columns) of places by their names, as `place_mask` makes them; raises `DecodeError`."""
+    if not isinstance(pins, Mapping):
+        raise DecodeError(
+            f"Places are given by names, such as {{'leaf': (50, 30)}}; given a {type(pins).__name__}."
+        )
+    return {name: place_mask(result, place, name) for name, place in pins.items()}
 
 
 def require_result(given: object) -> None:
@@ -87,10 +96,10 @@ def whole_numbers(given: object) -> tuple[int, ...] | None:
 
 
 def as_array(given: Any) -> NDArray[Any]:
-    """What was given as an array; without a value where lists in it differ in length."""
+    """What was given as an array; without a value where lists in it differ in length, or there is none."""
     try:
         return np.asarray(given)
-    except ValueError:
+    except (ValueError, TypeError):
         return np.empty(0, object)
 
 

@@ -28,6 +28,7 @@ from dsl_core.model.presets import PRESETS, preset_plan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.progress import Progress
+from dsl_core.words import as_given
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -222,7 +223,7 @@ def _grid(given: Any) -> WavelengthGrid:
         return WavelengthGrid(start_nm=first, stop_nm=last, step_nm=step)
     except ValidationError as error:
         words = "; ".join(what_is_wrong(fault) for fault in error.errors())
-        shown = ", ".join(f"{each:g}" if isinstance(each, float | int) else repr(each) for each in given)
+        shown = ", ".join(map(as_given, given))
         raise PlanError(f"bands_nm cannot be {shown}: {words}.") from error
 
 

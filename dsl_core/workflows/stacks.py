@@ -131,11 +131,19 @@ def _rig_for_depth(found: GeometryCalibration) -> Rig:
 
 
 def depth_of_columns(calibration: Rig | GeometryCalibration, column_px: ArrayLike) -> NDArray[np.float64]:
-    """What `dsl_core.api.arrays.depth_of_columns` says; raises `DecodeError` for another size."""
+    """What `dsl_core.api.arrays.depth_of_columns` says; raises `DecodeError` for another size.
+
+    Raises `CalibrationError` for what is no calibration, such as the path of one.
+    """
     import torch
 
     from dsl_core.optics.correspondence import triangulate
 
+    if not isinstance(calibration, Rig | GeometryCalibration):
+        raise CalibrationError(
+            "A calibration is needed, as load_calibration and calibrate_geometry return it; what was given is"
+            f" of type {type(calibration).__name__}."
+        )
     rig = calibration if isinstance(calibration, Rig) else _rig_for_depth(calibration)
     column = np.asarray(column_px, np.float64)
     if column.shape != (rig.camera.height_px, rig.camera.width_px):

@@ -43,6 +43,7 @@ Ask = Callable[[xr.Dataset], Any]
         (lambda r: r.dsl.spectrum(slice(0, 3), 2), "A pixel is two numbers"),
         (lambda r: r.dsl.region((1, 1, float("inf"), 2)), "in whole pixels"),
         (lambda r: r.dsl.region([(1, 2), (3,)]), "in whole pixels"),
+        (lambda r: r.dsl.region(r), r"in whole pixels; given <xarray\.Dataset> [^\n]*\.$"),
         (lambda r: r[["depth_mm", "flags"]].dsl.plot(x=4, y=2), "contains depth only"),
     ],
 )
@@ -86,6 +87,11 @@ def test_what_is_no_result_is_told(ask: Callable[[xr.Dataset, Any], Any], given:
 def test_what_is_no_path_is_told(ask: Callable[[Any], Any], given: Any) -> None:
     with pytest.raises(StoreError, match=r"A path is needed.*of type (int|bytes|NoneType|dict)\."):
         ask(given)
+
+
+def test_the_path_of_a_calibration_is_none() -> None:
+    with pytest.raises(CalibrationError, match=r"A calibration is needed.*of type str\."):
+        dsl.depth_of_columns("rig.json", np.zeros((2, 2)))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("pixels", [(4, 2), [4, 2], np.array([[4, 2]]), [(4.0, 2)], [np.array([4, 2])]])
