@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
+import sys
 from numbers import Real
 
 
@@ -72,12 +72,12 @@ def quoted(word: object) -> str:
 
 
 def readable(name: str) -> str:
-    """The name of a file as a text that can be written; a system may have one that is not in UTF-8.
+    """A name as a text that can be written; a system or a locale may have one that is not in UTF-8.
 
-    >>> readable("leaf"), readable(os.fsdecode(b"B" + bytes([0xE4]) + b"ume")) == f"B{chr(0xFFFD)}ume"
+    >>> readable("leaf"), chr(0xFFFD) in readable(f"B{chr(0xDCE4)}ume")
     ('leaf', True)
     """
-    return os.fsencode(name).decode(errors="replace")
+    return name.encode(errors=sys.getfilesystemencodeerrors()).decode(errors="replace")
 
 
 def natural(name: str) -> list[tuple[int, str]]:

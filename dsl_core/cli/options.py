@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from dsl_core.errors import DeviceError, PlanError, StoreError
+from dsl_core.words import readable
 
 if TYPE_CHECKING:
     from dsl_core.model.plan import CapturePlan, SpectralSet
@@ -333,7 +334,7 @@ def parse_place(name: str, text: str) -> tuple[str, list[int]]:
     numbers = _parts(name, place, wanted, int, ",") if called and place else []
     if len(numbers) not in (2, 4):
         raise PlanError(f"{name} must be {wanted}, not {text!r}.")
-    return called, numbers
+    return readable(called), numbers
 
 
 def _lengths(name: str, text: str, form: str, unit: str = "whole pixels") -> list[int]:

@@ -20,6 +20,7 @@ from dsl_core.io.export.common import colours, plane, provenance, require, requi
 from dsl_core.io.staging import staged
 from dsl_core.optics.colour import srgb_decode
 from dsl_core.solve.many import Check, never
+from dsl_core.words import readable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,6 +43,11 @@ def export_exr(
 ) -> list[Path]:
     """Write all bands, linear R, G, B and depth into one file; raises `StoreError`."""
     require_suffix(path, ".exr")
+    if (shown := readable(str(path))) != str(path):
+        raise StoreError(
+            f"{shown} cannot be written as OpenEXR, which takes no such letters in this locale. Choose a path"
+            " of plain letters, or a locale in UTF-8."
+        )
     require(result, "A spectral OpenEXR file", "reflectance", "wavelength_nm")
     import OpenEXR
 

@@ -64,10 +64,10 @@ def _write_obj(
     targets = [path, *others]
     with staged(targets, overwrite=overwrite) as drafts:
         if surface.texture is not None:
-            drafts[1].write_text(material_text(others[1].name), encoding="utf-8")
+            drafts[1].write_text(material_text(readable(others[1].name)), encoding="utf-8")
             drafts[2].write_bytes(png_bytes(surface.texture))
         with drafts[0].open("w", encoding="utf-8", newline="\n") as file:
-            write_obj(file, surface, others[0].name if others else "", origin, check)
+            write_obj(file, surface, readable(others[0].name) if others else "", origin, check)
     return targets
 
 

@@ -5,6 +5,7 @@ Layout: Wavefront Technologies, Object Files (.obj), appendix B1 of the Advanced
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO
@@ -24,7 +25,8 @@ MATERIAL = "surface"
 
 def material_files(path: Path) -> list[Path]:
     """The files of material and texture; names without spaces, at which many readers end a name."""
-    stem = "_".join(readable(path.stem).split())
+    # As this locale says what is written in UTF-8 within the files.
+    stem = os.fsdecode("_".join(readable(path.stem).split()).encode())
     return [path.with_name(f"{stem}.mtl"), path.with_name(f"{stem}.png")]
 
 
