@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -112,7 +111,7 @@ def classes_of_library(
     ``width_nm`` is how wide the bands are, as `at_bands` needs it. Raises `CalibrationError` when no entry
     covers the bands, or for an error that is none.
     """
-    if not isinstance(relative_error, Real) or not 0 <= relative_error < 1:
+    if not isinstance(relative_error, int | float | np.number) or not 0 <= relative_error < 1:
         raise CalibrationError(
             f"The error of a library is a share from 0 to 1, not {as_given(relative_error)}."
             " Give 0.02 for 2 %."

@@ -12,7 +12,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -66,7 +65,7 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name, given in (("worst", self.worst), ("margin", self.margin)):
-            if not isinstance(given, Real) or not 0 <= given < math.inf:
+            if not isinstance(given, int | float | np.number) or not 0 <= given < math.inf:
                 raise DecodeError(
                     f"The limit {name!r} must be a number of at least 0, not {as_given(given)}."
                 )

@@ -163,7 +163,8 @@ def colours(
 
 
 def _names_of_lights(given: object) -> list[str]:
-    names = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
-    if not names or not all(isinstance(each, str) for each in names):
+    found = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+    names = [each for each in found if isinstance(each, str)]
+    if not names or len(names) < len(found):
         raise DecodeError(f"Lights are given by names, one or several, such as 'D65'; given {given!r}.")
     return names

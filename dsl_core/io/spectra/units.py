@@ -16,8 +16,14 @@ _POWER = re.compile(r"(?<![a-zA-Zµμ])([nmµμuk]?)(?:W|Watts?)(?![a-zA-Z])([^\
 _TEN = re.compile(r"(?:10\s?\^\s?\(?|10[eE]|1[eE])([-+−]?\d{1,2})\)?[ ·*×]{0,3}$")
 _MICROMETRE = re.compile(r"(?<![a-zA-Z])(?:um|µm|μm|micromet(?:er|re)s?|microns?)(?![a-zA-Z])", re.IGNORECASE)
 _NANOMETRE = re.compile(r"(?<![a-zA-Z])(?:nm|nanomet(?:er|re)s?)(?![a-zA-Z])", re.IGNORECASE)
-_ANGSTROM = re.compile(r"(?<![a-zA-Z])(?:Å|angstr(?:o|ö)ms?)(?![a-zA-Z])", re.IGNORECASE)
+_ANGSTROM = re.compile(r"(?<![a-zA-Z])(?:Å|angstr(?:o|ö)ms?)(?![a-zA-Z])|[(\[]A[)\]]", re.IGNORECASE)
 _WAVENUMBER = re.compile(r"wave ?number|cm\s?(?:\^?-1|⁻¹)|1/cm", re.IGNORECASE)
+#: What axes of spectra may count instead of wavelength, with the name of each.
+_OTHER_AXES = (
+    ("wavenumber", _WAVENUMBER),
+    ("frequency", re.compile(r"frequency|\b[TPG]Hz\b", re.IGNORECASE)),
+    ("energy", re.compile(r"\benergy\b|\beV\b", re.IGNORECASE)),
+)
 #: Percent as a unit: "99 % reflectance" names a white standard, "0-100 %" the values.
 _PERCENT = re.compile(
     r"(?:(?<!\d)(?<!\d )|(?<![\d.])0 ?(?:-|–|\.\.+|…|to) ?100 ?)(?:%|percent)", re.IGNORECASE
@@ -144,11 +150,12 @@ def _to_radiance(before: str, prefix: str, behind: str) -> float:
 def to_nanometres(path: Path, given: Floats, title: str, around: str = "") -> Floats:
     """Wavelengths in nm; raises `CalibrationError` where the numbers contradict the stated unit."""
     least, most = float(given.min()), float(given.max())
-    if _WAVENUMBER.search(title):
-        raise CalibrationError(
-            f"{path.name} is over wavenumber ({least:g} to {most:g}); nanometres are needed. Export the"
-            " spectrum over wavelength."
-        )
+    for axis, words in _OTHER_AXES:
+        if words.search(title):
+            raise CalibrationError(
+                f"{path.name} is over {axis} ({least:g} to {most:g}); nanometres are needed. Export the"
+                " spectrum over wavelength."
+            )
     words = title if _NANOMETRE.search(title) or _MICROMETRE.search(title) else f"{title}\n{_spoken(around)}"
     if _ANGSTROM.search(words) and most > 1500:
         return given / 10.0

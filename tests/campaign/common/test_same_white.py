@@ -154,7 +154,8 @@ def test_noise_of_a_faint_filter_is_no_other_exposure(
     monkeypatch.setattr(Scanned, "code", NoCode())
 
     def noisy(self: Scanned, shot: Shot) -> np.ndarray:
-        return np.uint16(np.rint(read(self, shot) + 20.0 + 2.5 * rng.standard_normal((60, 80))))
+        seen = read(self, shot) + 20.0 + 2.5 * rng.standard_normal((60, 80))
+        return np.asarray(np.rint(seen), np.uint16)
 
     monkeypatch.setattr(Scanned, "read", noisy)
     faint = WhiteLevel(RATE, np.full(3, RATE), 0.0, False, np.full((6, 8), 0.3 * RATE), 1.0)

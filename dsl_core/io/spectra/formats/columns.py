@@ -41,8 +41,8 @@ def read_columns(path: Path) -> list[Spectrum]:
     found = _in_lines(path, text) or [s for table in tables_of(path, text) for s in spectra_of(path, table)]
     if not found:
         raise CalibrationError(
-            f"{path.name} contains no table of wavelengths and values. Export the spectrum as text in"
-            " two columns."
+            f"{path.name} contains no table of wavelengths and values with {MIN_ROWS} rows or more. Export"
+            " the spectrum as text in two columns."
         )
     return found
 

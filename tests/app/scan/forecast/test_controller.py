@@ -17,7 +17,7 @@ from dsl_core.capture.preflight import exposure_obstacles
 from dsl_core.capture.runner import State, Status
 from dsl_core.errors import PlanError
 from dsl_core.io.result.result_file import load_result, save_result
-from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
+from dsl_core.model.plan import CapturePlan, CodeSet, EnsembleCode, GrayCode, LineComb, NoSpectral, XorCode
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.rig import Rig
 from dsl_core.planning import prediction, samples
@@ -152,7 +152,9 @@ def test_plans_that_the_camera_cannot_take_are_not_offered(
     assert not [obstacle for each in points for obstacle in exposure_obstacles((0.02, 200.0), each.plan)]
     for budget_s in (30, 60, 600):
         control.answer(budget_s=budget_s)
-        assert bench.state.facts.value.obstacles == ()
+        facts = bench.state.facts.value
+        assert facts is not None
+        assert facts.obstacles == ()
     bench.scans.plans.choose_preset("coarse")
     assert control.state.current.value is None
     assert "exposes for 333.333 ms, but the camera supports 0.02 to 200 ms" in control.state.refusal.value
@@ -278,6 +280,15 @@ def test_a_damaged_store_is_made_anew(bench: ScanBench, tmp_path: Path) -> None:
     assert PredictionStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
     store._path.write_text('{"a": {"frames": 1}}')
     assert PredictionStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
+
+
+def test_figures_of_an_xor_code_alone_are_said_to_be_of_the_gray_code(bench: ScanBench) -> None:
+    def remark(code: CodeSet) -> str:
+        plan = COMB.model_copy(update={"code": code})
+        return ForecastPoint(plan, made_up_prediction(bench.calibration, plan, 50.0)).remark
+
+    assert "Gray code" in remark(XorCode(rows=False))
+    assert remark(GrayCode()) == remark(EnsembleCode()) == ""
 
 
 def test_titles_have_typographic_signs() -> None:
