@@ -47,7 +47,8 @@ def predict(
     """Expected figures of a plan on a rig.
 
     ``view`` is by default a plane at the rig's usual depth with the classic chart's spectra; a view of a
-    quick look brings its own. Raises `PlanError` for plans without spectral patterns or binary code, and
+    quick look brings its own. Columns are taken as those of a Gray code: an XOR code alone finds them worse.
+    Raises `PlanError` for plans without spectral patterns or binary code, and
     patterns that do not fit.
     """
     if isinstance(plan.spectral, NoSpectral) or plan.code_count == 0:

@@ -189,6 +189,8 @@ class ForecastPanel(QWidget):
             scene = chart if state.look.value is None else f"the scene of {state.look.value.stem}"
             origin = f"Expected from the calibration, for {scene} (press F1 to read how)."
             text = f"{done} of {total} plans predicted. {origin}" if total > 1 else origin
+            if state.current.value is not None:
+                text = f"{text} {state.current.value.remark}".rstrip()
         self._note.setText(text)
         self._enable_search()
 

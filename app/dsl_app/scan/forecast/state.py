@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_app.shared.evented import Value
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.plan import CapturePlan, XorCode
 from dsl_core.model.presets import PRESETS
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 #: The preset whose plan is the published one.
 PUBLISHED = "reference"
+XOR_REMARK = "Figures are those of the Gray code: an XOR code alone misreads more columns."
 _TITLES = {preset.key: preset.title for preset in PRESETS}
 
 
@@ -37,6 +38,11 @@ class ForecastPoint:
     def title(self) -> str:
         """Its displayed name."""
         return _TITLES.get(self.preset) or plan_title(self.plan)
+
+    @property
+    def remark(self) -> str:
+        """What its figures leave out of this plan, in a sentence; empty for nothing."""
+        return XOR_REMARK if isinstance(self.plan.code, XorCode) else ""
 
     @property
     def is_published(self) -> bool:
