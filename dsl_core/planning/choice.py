@@ -167,8 +167,12 @@ def brackets_on(rig: Rig, longest_ms: float) -> list[Exposures]:
 
 
 def light_scale(rig: Rig) -> float:
-    """How many times as long as on the published rig first orders take to fill the sensor, a power of two."""
-    return float(2.0 ** round(math.log2(_range_per_ms(published_rig()) / _range_per_ms(rig))))
+    """How many times as long as on the published rig first orders take to fill the sensor, a power of two.
+
+    1 for a rig without first orders.
+    """
+    own = _range_per_ms(rig)
+    return float(2.0 ** round(math.log2(_range_per_ms(published_rig()) / own))) if own > 0 else 1.0
 
 
 def _range_per_ms(rig: Rig) -> float:

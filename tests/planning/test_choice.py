@@ -163,6 +163,8 @@ def test_exposures_follow_the_light_and_the_range_of_the_sensor() -> None:
     assert brackets_on(rig.model_copy(update=sixteen), math.inf) == list(BRACKETS)
     near = {"reference_distance_mm": 2 * rig.reference_distance_mm}
     assert brackets_on(rig.model_copy(update=near), math.inf)[0] == ((2, 0.2), (5, 0.8))
+    # Without a film nothing says how much light there is.
+    assert brackets_on(rig.model_copy(update={"efficiency": {}}), math.inf) == list(BRACKETS)
 
 
 def test_that_no_plan_is_possible_is_told() -> None:

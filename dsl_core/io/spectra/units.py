@@ -150,8 +150,8 @@ def _to_radiance(before: str, prefix: str, behind: str) -> float:
 def to_nanometres(path: Path, given: Floats, title: str, around: str = "") -> Floats:
     """Wavelengths in nm; raises `CalibrationError` where the numbers contradict the stated unit."""
     least, most = float(given.min()), float(given.max())
-    for axis, words in _OTHER_AXES:
-        if words.search(title):
+    for axis, said in _OTHER_AXES:
+        if said.search(title):
             raise CalibrationError(
                 f"{path.name} is over {axis} ({least:g} to {most:g}); nanometres are needed. Export the"
                 " spectrum over wavelength."
