@@ -36,11 +36,13 @@ def judge_line(known: Known, shot: Shot, seen: Counts) -> Finding:
         return Finding(shot, Verdict.UNTOLD)
     share = brightness_of_lines(seen, lit, wanted, known.noise)
     # Pixels see a share of their own of each colour, which pictures of other colours do not tell.
-    usual = np.float32(FILM_SHARE if _is_uniform(wanted) else known.learned.usual.share(shot))
+    is_uniform = _is_uniform(wanted)
+    usual = np.float32(FILM_SHARE if is_uniform else known.learned.usual.share(shot))
     profiles = [(verdict, known.profile(rival)) for verdict, rival in known.rivals(shot)]
     rivals = [(verdict, usual * profile) for verdict, profile in profiles if profile is not None]
-    # White is known from its own picture, however bright lines are.
-    rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, np.ones_like(wanted))]
+    # Next to a picture of one colour, white is known from its own, however bright that colour is.
+    white = np.ones_like(wanted) if is_uniform else usual * np.ones_like(wanted)
+    rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, white)]
     asked = {verdict: ballots_of_lines(seen, lit, usual * wanted, rival) for verdict, rival in rivals}
     contests = {verdict: counted(each.votes) for verdict, each in asked.items()}
     found = decide(shot, contests, share, known.learned, lambda: _line_shown(known, lit, seen, shot))
