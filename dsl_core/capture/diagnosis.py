@@ -15,8 +15,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from dsl_core.capture.altered import alteration, ends_early
-from dsl_core.capture.motion import TILES, Movement, moved_between
+from dsl_core.capture.motion import Movement, moved_between
 from dsl_core.capture.proof.again.room_again import said_of_room, said_of_slight_change
+from dsl_core.capture.proof.again.white_tiles import (
+    CAME_IN,
+    light_of_tiles,
+    said_of_light_up,
+    said_of_places,
+    said_of_shade,
+)
 from dsl_core.capture.proof.lasting.black_light import lit_black
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
@@ -52,21 +59,9 @@ BESIDE_PX = 5
 FEWEST, LIT_SIGMAS = 12, 5.0
 #: A frame of the code shows another pattern if its pixels differ by this share of white: noise makes less.
 OTHER_PATTERN = 0.08
-#: Something stands before tiles of the picture that have lost light to this share, so many, while others have
-#: kept it: a tenth of them within so much, and none has gained more than so much.
-SHADED, FEWEST_SHADED, ELSEWHERE, GAINED = 0.7, 2, 0.06, 0.15
-#: Something lights tiles of white that have so many times their light, while others have kept it.
-LIT_UP = 1.3
-_CAME_IN = (
-    "something came into the projected picture (a message, a window, the mouse pointer), or a lamp into view."
-    " Take it away and close other programs."
-)
 #: Stripes of the code are out of focus with less than this share of the contrast (squared) they had, and the
 #: light they had but for so much of white's.
 SOFTER, SAME_SHARE = 0.85, 0.03
-#: Light has changed by place if a tenth of the tiles have less, and another tenth more, than this share of
-#: all of it apart.
-BY_PLACE = 0.15
 
 
 @dataclass(frozen=True)
@@ -202,12 +197,12 @@ def what_changed(before: References, now: References, sensor: Sensor) -> Explana
     altered = alteration(before.pictures, now.pictures, sensor)
     if altered:
         return Explanation(altered, is_of_all=True)
-    tiles = _light_of_tiles(light.old, light.new, light.used)
+    tiles = light_of_tiles(light.old, light.new, light.used)
     moved = moved_between((before.white, before.black), (now.white, now.black), sensor, is_pattern=False)
-    shaded = _shaded(tiles, light.used.shape)
+    shaded = said_of_shade(tiles, light.used.shape)
     if moved is None or not moved.is_sure:
         # Edges of what is bright move into tiles that are dark otherwise, and light them.
-        shaded = shaded or _lit_up(tiles, light.used.shape)
+        shaded = shaded or said_of_light_up(tiles, light.used.shape)
     if shaded:
         return Explanation(shaded)
     return _of_light_or_motion(before, now, sensor, light, tiles, moved)
@@ -231,7 +226,7 @@ def _appeared(before: References, now: References, sensor: Sensor) -> str:
     if is_ is None or was is not None or is_.is_in_stripes:
         return ""
     where = "columns {}-{}, rows {}-{} of the picture".format(*is_.columns, *is_.rows)
-    return f"Since the scan began, black has become as bright as white in {where}: {_CAME_IN}"
+    return f"Since the scan began, black has become as bright as white in {where}: {CAME_IN}"
 
 
 def _lights(before: References, now: References, sensor: Sensor) -> _Lights | None:
@@ -265,7 +260,7 @@ def _of_light_or_motion(
     is_uneven = max(colours) > (1 + UNEVEN) * min(colours)
     by_place = ""
     if light.is_other and not is_uneven and moved is None:
-        by_place = _said_of_places(tiles, light.factor)
+        by_place = said_of_places(tiles, light.factor)
     found = [_said_of_colours(colours) if is_uneven else by_place or _said_of_light(light)]
     white_dn, tells_room = float(light.old[light.lit].mean()), is_uneven or not light.is_exposed_otherwise
     found.append(said_of_room(light.darks, white_dn) if tells_room else "")
@@ -335,18 +330,6 @@ def _is_other_pattern(
     return float(np.abs(second - first)[used].mean()) > OTHER_PATTERN * float(white[used].mean())
 
 
-def _said_of_places(tiles: NDArray[np.float64], light: float) -> str:
-    """That parts of the picture have lost or gained more light than others; empty where all have alike."""
-    low, high = (float(each) for each in np.nanquantile(tiles, (0.1, 0.9)))
-    if high - low < BY_PLACE * light:
-        return ""
-    return (
-        f"The light of white is {low:.2f} times what it was when the scan began in some parts of the picture"
-        f" and {high:.2f} times in others: moisture, haze or dust came before a lens, the film or the target,"
-        " or a lamp of the room or the projector moved. Clear the way of the light."
-    )
-
-
 def _has_softer_stripes(before: References, now: References, lit: NDArray[np.bool_]) -> bool:
     """Whether a frame of the code is nearer to half of white, with as much light: a motion leaves both."""
     shares, contrasts = [], []
@@ -357,50 +340,6 @@ def _has_softer_stripes(before: References, now: References, lit: NDArray[np.boo
         shares.append(float(code.sum() / white.sum()))
         contrasts.append(float(np.square(2 * code - white).sum() / np.square(white).sum()))
     return contrasts[1] < SOFTER * contrasts[0] and abs(shares[1] - shares[0]) < SAME_SHARE
-
-
-def _light_of_tiles(
-    old: NDArray[np.float64], new: NDArray[np.float64], used: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """White less black over what it was in each of `TILES`, flat; NaN where there is little light."""
-    down, across = (np.arange(size) * count // size for size, count in zip(old.shape, TILES, strict=True))
-    tile = (down[:, None] * TILES[1] + across)[used]
-    before, after = (np.bincount(tile, each[used], TILES[0] * TILES[1]) for each in (old, new))
-    known = before > max(0.25 * before.max(), 0.0)
-    if not known.any():
-        return np.ones(before.size)
-    return np.asarray(np.divide(after, before, out=np.full(before.size, np.nan), where=known))
-
-
-def _shaded(tiles: NDArray[np.float64], shape: tuple[int, ...]) -> str:
-    """Whether white, less black, has lost light in a part of the picture alone."""
-    lost = tiles < SHADED
-    is_kept = abs(float(np.nanquantile(tiles, 0.9)) - 1) < ELSEWHERE and float(np.nanmax(tiles)) < 1 + GAINED
-    if int(lost.sum()) < FEWEST_SHADED or not is_kept:
-        return ""
-    return (
-        f"White has lost light in {_place_of(lost, shape)}, and not elsewhere: something"
-        " stands in the way of projector, camera or lamps, or something came onto a lens. Take it away."
-    )
-
-
-def _lit_up(tiles: NDArray[np.float64], shape: tuple[int, ...]) -> str:
-    """Whether white, less black, has gained light in a part of the picture alone."""
-    gained = tiles > LIT_UP
-    usual, least = float(np.nanmedian(tiles)), float(np.nanmin(tiles))
-    if not gained.any() or abs(usual - 1) > ELSEWHERE or least < 1 - ELSEWHERE:
-        return ""
-    return f"White has gained light in {_place_of(gained, shape)}, and not elsewhere: {_CAME_IN}"
-
-
-def _place_of(tiles: NDArray[np.bool_], shape: tuple[int, ...]) -> str:
-    """Where tiles of a picture are, in words."""
-    rows, columns = np.divmod(np.flatnonzero(tiles), TILES[1])
-    spans = [
-        (int(at.min()) * size // count, (int(at.max()) + 1) * size // count)
-        for at, size, count in zip((columns, rows), shape[::-1], TILES[::-1], strict=True)
-    ]
-    return "columns {}-{}, rows {}-{} of the picture".format(*spans[0], *spans[1])
 
 
 def _of_colours(
