@@ -62,11 +62,7 @@ def test_results_dropped_together_become_a_depth_test(qtbot: QtBot, bench: Bench
 
 def test_a_position_is_typed_and_a_row_removed_by_keys(qtbot: QtBot, bench: Bench, stage: list[Path]) -> None:
     panel = filled(qtbot, bench, stage)
-    item = panel.table.item(1, 1)
-    assert item is not None
-    panel.table.setCurrentItem(item)
-    panel.table.editItem(item)
-    (editor,) = panel.table.findChildren(QLineEdit)
+    editor = editor_of_second(panel)
     editor.setText("730,5")
     QTest.keyClick(editor, Qt.Key.Key_Return)
     qtbot.waitUntil(lambda: bench.state.rows.value[1].position_mm == 730.5)
@@ -83,15 +79,22 @@ def test_a_position_is_typed_and_a_row_removed_by_keys(qtbot: QtBot, bench: Benc
     qtbot.waitUntil(lambda: panel.table.item(0, 1).text() == "700")  # type: ignore[union-attr]
 
 
-def test_a_position_is_typed_while_other_results_are_read(
-    qtbot: QtBot, bench: Bench, stage: list[Path], tmp_path: Path
-) -> None:
-    panel = filled(qtbot, bench, stage)
+def editor_of_second(panel: SeriesPanel) -> QLineEdit:
+    """The editor of the second row's position, opened."""
     item = panel.table.item(1, 1)
     assert item is not None
     panel.table.setCurrentItem(item)
     panel.table.editItem(item)
     (editor,) = panel.table.findChildren(QLineEdit)
+    assert isinstance(editor, QLineEdit)
+    return editor
+
+
+def test_a_position_is_typed_while_other_results_are_read(
+    qtbot: QtBot, bench: Bench, stage: list[Path], tmp_path: Path
+) -> None:
+    panel = filled(qtbot, bench, stage)
+    editor = editor_of_second(panel)
     editor.setText("73")
     bench.drop(write_stage(tmp_path, 800.0))
     qtbot.waitUntil(lambda: len(bench.state.counted) == len(stage) + 1, timeout=30_000)
@@ -106,10 +109,7 @@ def test_an_editor_left_by_escape_shows_what_came_meanwhile(
     qtbot: QtBot, bench: Bench, stage: list[Path], tmp_path: Path
 ) -> None:
     panel = filled(qtbot, bench, stage)
-    item = panel.table.item(1, 1)
-    assert item is not None
-    panel.table.editItem(item)
-    (editor,) = panel.table.findChildren(QLineEdit)
+    editor = editor_of_second(panel)
     bench.page._series_control.remove(stage[0])
     assert panel.table.rowCount() == len(stage)
     QTest.keyClick(editor, Qt.Key.Key_Escape)
