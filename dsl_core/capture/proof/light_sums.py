@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dsl_core.capture.proof.code.code_sum import CodeSum
-from dsl_core.capture.proof.lines.line_sum import LineSum
+from dsl_core.capture.proof.lines.line_sum import LESS_THAN_NONE, LineSum, is_below_none
 
 #: No deviation is given as less than this.
 LEAST_STD = 0.005
@@ -47,6 +47,8 @@ def light_sentence(code: CodeSum | None, lines: LineSum | None) -> str:
     if lines is None or not lines.is_off:
         return ""
     seen = f"All lines together have {of_lines} times the light of white, which they add up to"
+    if is_below_none(lines.share, lines.std):
+        return f"{seen}{LESS_THAN_NONE}"
     if code is not None and lines.share > 1:
         return (
             f"{seen}; patterns and their inverses do add up to it. The projector makes a picture that is all"

@@ -131,6 +131,7 @@ def of_lines(share: float) -> LineSum:
         (of_code(1.0), of_lines(0.8), "projector gives dark pictures another share of its light than bright"),
         (None, of_lines(1.2), "All lines together have 1.20 ± 0.01 times the light of white, which they add"),
         (of_code(1.0), of_lines(1.2), "or the camera's values are not proportional to the light"),
+        (of_code(1.0), of_lines(-0.3), "less than none, so that black was darker than in its own pictures"),
         (of_code(1.0), of_lines(1.24), "darker than the dark parts of others (dynamic black, iris), other"),
         (
             of_code(1.02, 0.3),

@@ -26,6 +26,19 @@ UNSEEN_DN, UNKNOWN_DN = 0.1, 1.0
 EVEN, EDGE = 0.02, 16
 #: Pixels needed to say anything.
 FEWEST = 60
+#: A share of white below none by so many deviations is less light than black had.
+SIGMAS_BELOW = 3.0
+#: What that tells: no shadow and no projector takes more light than there is.
+LESS_THAN_NONE = (
+    ": less than none, so that black was darker than in its own pictures. The light of the room (sun, lamps)"
+    " or the camera's black level changed in between. Keep the light of the room away, let the camera warm"
+    " up, and scan again."
+)
+
+
+def is_below_none(share: float, std: float) -> bool:
+    """Whether a share of the light of white, with its deviation, is surely negative."""
+    return share < -SIGMAS_BELOW * std
 
 
 @dataclass(frozen=True)

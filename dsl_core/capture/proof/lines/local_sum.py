@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.lines.line_sum import even_cover
+from dsl_core.capture.proof.lines.line_sum import LESS_THAN_NONE, even_cover, is_below_none
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.prediction import Lit
 from dsl_core.capture.proof.raster import Counts, Raster
@@ -60,20 +60,22 @@ class LocalSum:
     def sentence(self) -> str:
         """What is wrong."""
         first, last = self.shots
+        seen = (
+            f"between frame {first.number} and frame {last.number} have {self.share:.2f} ±"
+            f" {max(self.std, 0.005):.2f} times the light of white, which all lines add up to"
+        )
+        if is_below_none(self.share, self.std):
+            return f"Lines {seen}{LESS_THAN_NONE}"
         if self.all_rows:
             return (
-                f"Lines between frame {first.number} and frame {last.number} have {self.share:.2f} ±"
-                f" {max(self.std, 0.005):.2f} times the light of white, which all lines add up to, and others"
-                " have not: the light of the projector changed for them (eco mode, iris, the lamp), or all"
-                " they lit was in a shadow or smoke. Switch eco mode and dynamic contrast off, keep the way"
-                " of the light free, and scan again."
+                f"Lines {seen}, and others have not: the light of the projector changed for them (eco mode,"
+                " iris, the lamp), or all they lit was in a shadow or smoke. Switch eco mode and dynamic"
+                " contrast off, keep the way of the light free, and scan again."
             )
         return (
-            f"In parts of the picture, lines between frame {first.number} and frame {last.number} have"
-            f" {self.share:.2f} ± {max(self.std, 0.005):.2f} times the light of white, which all lines add up"
-            " to: something cast a shadow, smoke or steam drifted by, the light changed, or other light came"
-            " in while they were captured. Keep the way of the light free and the room as it is, and scan"
-            " again."
+            f"In parts of the picture, lines {seen}: something cast a shadow, smoke or steam drifted by, the"
+            " light changed, or other light came in while they were captured. Keep the way of the light free"
+            " and the room as it is, and scan again."
         )
 
 

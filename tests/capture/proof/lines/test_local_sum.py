@@ -147,3 +147,13 @@ def test_light_that_white_shows_to_have_drifted_is_no_shadow() -> None:
 
     assert found(drift) is not None
     assert found(drift, every=8) is None
+
+
+@pytest.mark.parametrize("all_rows", [True, False])
+@pytest.mark.parametrize(("share", "is_room"), [(-0.67, True), (-0.1, False), (0.67, False)])
+def test_less_light_than_none_is_no_projector_that_dims(share: float, is_room: bool, all_rows: bool) -> None:
+    """Sun that went while lines were captured was told as an eco mode of the projector."""
+    shots = list(plan().shots())
+    said = LocalSum(share, 0.1, (shots[-9], shots[-5]), all_rows).sentence
+    assert ("less than none" in said and "light of the room (sun, lamps)" in said) == is_room
+    assert ("eco mode" in said) == (all_rows and not is_room)
