@@ -149,7 +149,6 @@ def reconstruct(
     and normals as soon as they are known: spectra take much longer. Threads have whole pictures or tiles to
     work on, never parts of one tensor: see `one_kernel_thread`.
     """
-    from dsl_core.reconstruction.code_agreement import rows_apart_px
     from dsl_core.reconstruction.geometry_steps import GeometrySteps
     from dsl_core.reconstruction.light.early_ends import EarlyEnds
     from dsl_core.reconstruction.light.mean_black import mean_black
@@ -185,8 +184,7 @@ def reconstruct(
     solver = None
     if options.spectra:
         with timer.stage("spectra"):
-            pixels, rows_px = known_pixels(geometry), rows_apart_px(findings)
-            solver = row_solver(rig, plan, options, frames, pixels, progress, rows_px)
+            solver = row_solver(rig, plan, options, frames, known_pixels(geometry), progress, findings)
         if solver.followed is not None and solver.followed.turn is not None:
             geometry = solver.followed.turn.doubted(geometry, options.surface_window_px)
     result = Assembly(rig, plan, options, geometry, frames.bands, sink or MemorySink())

@@ -104,7 +104,9 @@ def cause_findings(
         else:
             yield from (of_film, _turn(turn, motion))
     place = _film(causes, probe)
-    told = place.significant and probe.places and causes.displaced
+    # Light that has changed its colour is told as that.
+    by_light = motion is not None and motion.by_light
+    told = place.significant and probe.places and causes.displaced and not by_light
     yield place.model_copy(update={"significant": told})
     for finding in _gains(causes, bool(corrected)):
         unequal = corrected is not False and causes.unequal
@@ -259,6 +261,7 @@ def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float, turn: Turn |
         if motion.may_be_dent(calibrated_px)
         else ""
     )
+    unsure = "The light has changed its colour, which looks alike" if motion.by_light else "It may be chance"
     moved = f"moved since the calibration{or_dented}: {', '.join(clauses)}. {by_nm}"
     return FitFinding(
         part="film",
@@ -270,7 +273,7 @@ def _motion(motion: FilmMotion, probe: Probe, calibrated_px: float, turn: Turn |
         significant=motion.sure,
         sentence=f"The film has {moved}{CORRECTED}"
         if motion.sure
-        else f"The film may have {moved} It may be chance, so that the spectra are not corrected for it."
+        else f"The film may have {moved} {unsure}, so that the spectra are not corrected for it."
         + _unsure_depth(turn),
         advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
         " The level and the colour of the light may have changed, too, which no scan can tell: reflectance"

@@ -120,6 +120,11 @@ def colour_findings(colours: Sequence[ColoursAgain]) -> Iterator[FitFinding]:
     )
 
 
+def colour_changed(found: Iterable[FitFinding]) -> bool:
+    """Whether `colour_findings` have told that the light has another colour than at the beginning."""
+    return any(each.name == COLOUR and each.significant for each in found)
+
+
 def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:
     """What the course of the light says to a person."""
     change = float(np.expm1(course.drift))

@@ -53,7 +53,7 @@ class FilmMotion:
 
     ``shift_px`` is by how much they displace the first orders at the probed pixels, root mean square, and
     ``shift_std_px`` its deviation. A motion that is not ``sure`` does not make the frames of
-    a scan fit better.
+    a scan fit better, or is as likely ``by_light`` that has changed its colour.
     """
 
     values: Floats
@@ -61,6 +61,7 @@ class FilmMotion:
     shift_px: float
     shift_std_px: float
     sure: bool = True
+    by_light: bool = False
 
     def may_be_dent(self, calibrated_px: float) -> bool:
         """Whether a film whose orders lay so far (rms, px) from their places when calibrated looks so."""

@@ -56,10 +56,16 @@ class Followed:
         return self.motion is not None or (bool(self.balanced) and self.aged)
 
 
-def follow(scan: ProbedScan, as_calibrated: bool = False, rows_px: float | None = None) -> Followed | None:
+def follow(
+    scan: ProbedScan,
+    as_calibrated: bool = False,
+    rows_px: float | None = None,
+    colour_changed: bool = False,
+) -> Followed | None:
     """The model of a scan with what the scan shows of the film taken over; None where it shows nothing.
 
     With ``as_calibrated`` the model stays as it is. ``rows_px`` is as for `find_turn`.
+    Light that changed its colour on the way displaces the orders as a film does: then no motion is sure.
     """
     found = probe(scan)
     if found is None or as_calibrated:
@@ -71,11 +77,11 @@ def follow(scan: ProbedScan, as_calibrated: bool = False, rows_px: float | None 
             break
         there = moved(model, more)
         after = probe(replace(scan, model=there))
-        if after is None or not more.sure or not fits_better(found, after):
+        if after is None or not more.sure or colour_changed or not fits_better(found, after):
             # Spectra that curve along wide bands displace the orders as well; and what displaces one order
             # where there is no other can be more than a film.
             if motion is None and coarseness(found.step_nm) <= 1 and found.seen_orders.all():
-                motion, doubt = replace(more, sure=False), (there, after)
+                motion, doubt = replace(more, sure=False, by_light=colour_changed), (there, after)
             break
         model, found = there, after
         motion = more if motion is None else motion.then(more)

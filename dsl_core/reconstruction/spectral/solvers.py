@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from dsl_core.errors import PlanError
@@ -14,6 +14,8 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 from dsl_core.progress import Progress
+from dsl_core.reconstruction.code_agreement import rows_apart_px
+from dsl_core.reconstruction.light.told import colour_changed
 from dsl_core.reconstruction.merge import PickedLines
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.rows.frames import ScanFrames
@@ -69,11 +71,11 @@ def row_solver(
     frames: ScanFrames,
     pixels: Pixels,
     progress: Progress | None = None,
-    rows_px: float | None = None,
+    told: Sequence[FitFinding] = (),
 ) -> RowSolver:
     """Spectra of known pixels, with the solver and the model of correspondence that ``options`` name.
 
-    ``rows_px`` is by how much (rms) the rows of a code disagree with depth, None where it has none.
+    ``told`` is what light and geometry have said: what they explain is not put down to the film.
     Raises `PlanError` for an unknown solver or patterns that it cannot read, `CalibrationError` for a model
     that the calibration does not hold.
     """
@@ -92,8 +94,8 @@ def row_solver(
     findings: list[FitFinding] = []
     if lines is not None and lines.single and asked.size:
         seen = FirstOrderLight.of(lines, model, picked, pixels)
-        told = colour_sites_finding(rig, seen), order_balance_finding(rig, seen)
-        findings = [each for each in told if each is not None]
+        of_orders = colour_sites_finding(rig, seen), order_balance_finding(rig, seen)
+        findings = [each for each in of_orders if each is not None]
 
     def cubes(picked: PickedLines) -> tuple[PickedCube, PickedCube]:
         width = pixels.valid.shape[1]
@@ -101,7 +103,7 @@ def row_solver(
 
     best = SpectralReconstruction(
         rig, plan, options.grid, model, *cubes(picked), pixels,
-        device=options.device, rows_px=rows_px,
+        device=options.device, rows_px=rows_apart_px(told), colour_changed=colour_changed(told),
         as_calibrated=options.as_calibrated or not options.refine_columns,
     )  # fmt: skip
     if frames.light is not None and frames.light.flickers:

@@ -85,10 +85,12 @@ class SpectralReconstruction:
         dtype: torch.dtype = torch.float32,
         as_calibrated: bool = False,
         rows_px: float | None = None,
+        colour_changed: bool = False,
     ) -> None:
         """With ``as_calibrated`` the model stays as it is, whatever the scan itself says.
 
         ``rows_px`` is by how much (rms) the rows of a code disagree with depth, None where it has none.
+        ``colour_changed`` is whether the light had another colour at the end than at the beginning.
         Where frames come by rows, ``radiance`` and ``std`` are those of the pixels that `learn` asks.
         """
         self.rig, self.pixels = rig, pixels
@@ -109,7 +111,7 @@ class SpectralReconstruction:
         direct_error = zero_order_error(rig, plan)
         self._dense = DenseTiles(self.prior, direct_error) if usual and not self.model.single else None
         self._tensors = TensorTiles(self.prior, direct_error)
-        self._as_calibrated, self._rows_px = as_calibrated, rows_px
+        self._as_calibrated, self._rows_px, self._colour_changed = as_calibrated, rows_px, colour_changed
         #: The row of the picture that the stacks begin with.
         self._first_row = 0
 
@@ -130,7 +132,9 @@ class SpectralReconstruction:
     def learn(self) -> None:
         """Have the model follow what the scan says of it, and know how wrong it still is."""
         with one_kernel_thread():
-            self.followed = found = follow(self.probed, self._as_calibrated, self._rows_px)
+            self.followed = found = follow(
+                self.probed, self._as_calibrated, self._rows_px, self._colour_changed
+            )
             if found is not None:
                 self.model, self.bands = found.model, found.model.bands
                 common = common_error(found.left, fit_causes(found.left))

@@ -218,6 +218,10 @@ def test_a_film_that_was_followed_is_said_to_have_moved_and_by_how_much(
     perhaps = Fit.of(cause_findings(probed(devices.calibration, scan), motion=replace(motion, sure=False)))
     assert perhaps.parts == ()
     assert any("may have moved" in found.sentence for found in perhaps.findings)
+    by_light = replace(motion, sure=False, by_light=True)
+    coloured = Fit.of(cause_findings(probed(devices.calibration, scan), motion=by_light))
+    assert coloured.parts == ()
+    assert any("changed its colour, which looks alike" in found.sentence for found in coloured.findings)
 
 
 @pytest.mark.parametrize(

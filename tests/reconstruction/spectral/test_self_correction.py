@@ -238,3 +238,21 @@ def test_what_has_changed_may_have_changed_the_level_of_its_light_as_well(
     fits.append(fit_of(*given, said, earlier=[other]))
     told = [any(each.name == MISFIT for each in fit.findings) for fit in fits]
     assert told == [True, True, False], "with other colours, nothing else is looked for"
+
+
+@pytest.mark.parametrize("colour_changed", [False, True])
+def test_light_that_changed_its_colour_is_not_taken_for_a_film_that_moved(
+    scanned: tuple[Rig, MemoryScan], colour_changed: bool
+) -> None:
+    rig, scan = scanned
+    stack, pixels = solver_input(rig, scan)
+    slipped = with_film(rig, -SLIPS)
+    data = (slipped, scan.plan, WavelengthGrid(), correspondence(slipped), stack.radiance, stack.std, pixels)
+    solver = SpectralReconstruction(*data, colour_changed=colour_changed)
+    places = solver.model
+    solver.learn()
+    assert solver.followed is not None
+    motion = solver.followed.motion
+    assert motion is not None
+    assert (motion.sure, motion.by_light) == (not colour_changed, colour_changed)
+    assert (solver.model is places) == colour_changed
