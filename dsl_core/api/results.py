@@ -58,7 +58,7 @@ def evaluate(result: xr.Dataset) -> Evaluation:
     Raises `DecodeError` for a result of another rig.
     """
     from dsl_core import pipeline
-    from dsl_core.workflows.scans import truth_of
+    from dsl_core.workflows.truths import truth_of
 
     require_result(result)
     result = canonical(result)

@@ -111,10 +111,10 @@ def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Datase
     from dsl_core.evaluation.report.scan_report import report_content
     from dsl_core.evaluation.verdict import Goal, figures
     from dsl_core.io.export import export
-    from dsl_core.workflows import scans
+    from dsl_core.workflows.truths import truth_of
 
     with timer.stage("evaluate"):
-        truth = scans.truth_of(result)
+        truth = truth_of(result)
         evaluation = pipeline.evaluate(result, truth)
     with timer.stage("export PLY, PNG, ENVI"):
         for form, name in (("ply", "points.ply"), ("png", "picture.png"), ("envi", "cube.hdr")):

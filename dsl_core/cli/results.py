@@ -53,7 +53,7 @@ def evaluate(
     from dsl_core.evaluation.verdict import deviations, figures
     from dsl_core.io.neighbours import beside_result, stem_of
     from dsl_core.io.result.result_file import load_result, read_attributes
-    from dsl_core.workflows import scans
+    from dsl_core.workflows.truths import truth_of
 
     if report is None:
         read_attributes(path)
@@ -61,7 +61,7 @@ def evaluate(
     output = Output(json)
     check_targets([report], overwrite=force)
     result = load_result(path)
-    truth = scans.truth_of(result, truth_rig, parse_options(option))
+    truth = truth_of(result, truth_rig, parse_options(option))
     evaluation = pipeline.evaluate(result, truth)
     pipeline.write_report(report_content(stem_of(path), result, truth, evaluation), report, force)
     print_figures(output, evaluation)

@@ -25,7 +25,7 @@ from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.origin import rig_of_notes
 from dsl_core.model.attributes import plan_of, stated_band_width_nm
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.workflows.scans import truth_of
+from dsl_core.workflows.truths import truth_of
 
 #: A number of mm in the name of a result, as in ``stage -695,2 mm.zarr``. What can be read in two ways is
 #: found without its number: a dash after a word need not be a minus, and what parts "1,200" or "1 200" may

@@ -12,7 +12,7 @@ from dsl_core.model.spectral import SpectralCurve, at_bands
 from dsl_core.resources import resource_path
 from dsl_core.simulation.scenes.materials import chart_spectra
 from dsl_core.simulation.scenes.truth import FINE_NM
-from dsl_core.workflows.scans import truth_of
+from dsl_core.workflows.truths import truth_of
 
 #: A part of the picture with four patches and what is between them.
 PART = {"y": slice(20, 130), "x": slice(20, 160)}

@@ -29,7 +29,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.optics.sensor import relative_gain
 from dsl_core.optics.spectra import chain_response
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.twin_scan import twin_scan
 
@@ -160,7 +160,7 @@ def study(seed: int, size: str, folder: Path, settings: Sequence[str]) -> dict[s
         seconds, memory_mb = calibrate(seed, size, home, settings)
     found = load_rig(home / "rig.json")
     devices, scan = twin_scan(truth=str(seed), size=size, scene="color-checker", seed=str(1000 + seed))
-    truth = scans.twin_truth(devices, WavelengthGrid())
+    truth = truths.twin_truth(devices, WavelengthGrid())
     true_rig = devices.camera.world.rig  # type: ignore[attr-defined]
     assert truth is not None
     held_out = held_out_patches(home)

@@ -32,7 +32,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.pipeline import evaluate, reconstruct
 from dsl_core.workflows.pictures import calibrate_camera_alone, read_pose
-from dsl_core.workflows.scans import twin_truth
+from dsl_core.workflows.truths import twin_truth
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases import board_poses
 from tests.cases.twin_scan import twin_scan

@@ -50,7 +50,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.rows.assembly import Assembly
 from dsl_core.reconstruction.rows.bands import Band
 from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.twin_scan import MemoryScan, capture
 
@@ -130,7 +130,7 @@ def capture_variant(
     from dsl_core.simulation.sim_devices import open_twin
 
     devices = open_twin({**look, "size": size, "seed": str(1000 + seed), **rig_options(variant, seed)})
-    truth = scans.twin_truth(devices, WavelengthGrid())
+    truth = truths.twin_truth(devices, WavelengthGrid())
     assert truth is not None
     world = devices.camera.world  # type: ignore[attr-defined]
     shown = plan or CapturePlan()

@@ -18,7 +18,7 @@ from dsl_core.model.presets import PRESETS
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import LATENCY_MS, open_twin
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.memory_sink import MemorySink
 
@@ -34,7 +34,7 @@ def measure(plan: CapturePlan, scene: str, size: str) -> Evaluation:
         Runner(rig, fitted, sink, pattern_image).run()
         assert rig.calibration is not None
         result = pipeline.reconstruct(sink, rig.calibration)
-        truth = scans.twin_truth(rig, WavelengthGrid())
+        truth = truths.twin_truth(rig, WavelengthGrid())
     assert truth is not None
     return pipeline.evaluate(result, truth)
 

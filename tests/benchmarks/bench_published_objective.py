@@ -34,7 +34,7 @@ from dsl_core.reconstruction.spectral.nearest_line import NearestLine
 from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
 from dsl_core.reconstruction.spectral.solving.tile_frames import Pixels
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.cases.twin_scan import solver_input, twin_scan
 
 SIZE = "445x290"
@@ -156,7 +156,7 @@ def compare(scene: str, thin: int, steps: int) -> None:
     """Scan a scene, solve it twice, print errors and times."""
     grid = WavelengthGrid()
     devices, scan = twin_scan(size=SIZE, scene=scene)
-    rig, truth = devices.calibration, scans.twin_truth(devices, grid)
+    rig, truth = devices.calibration, truths.twin_truth(devices, grid)
     assert rig is not None
     assert truth is not None
     stack, pixels = solver_input(rig, scan)

@@ -25,7 +25,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Sentinels
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.pipeline import Options, evaluate, reconstruct
 from dsl_core.simulation.sim_devices import open_twin
-from dsl_core.workflows.scans import twin_truth
+from dsl_core.workflows.truths import twin_truth
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.changing_rig import Change, changing, from_shot, shifted
 from tests.cases.memory_sink import MemorySink

@@ -33,7 +33,7 @@ from dsl_core.reconstruction.scan_result import known_pixels
 from dsl_core.reconstruction.spectral.solving.prior import Prior
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.simulation.sim_devices import open_twin
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.twin_scan import assembled
 
@@ -94,7 +94,7 @@ def prepare(scene: str, size: str) -> Prepared:
 
 def calibration_and_truth(devices: DeviceRig) -> tuple[Rig, Truth]:
     """What the twin knows of itself and of its scene."""
-    truth = scans.twin_truth(devices, GRID)
+    truth = truths.twin_truth(devices, GRID)
     assert devices.calibration is not None
     assert truth is not None
     return devices.calibration, truth

@@ -29,7 +29,7 @@ from dsl_core.reconstruction.code_agreement import (
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.named_rows import named_rows
 from dsl_core.words import counted
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.cases.small_rig import small_rig
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
@@ -48,7 +48,7 @@ def findings(
 ) -> tuple[dict[str, FitFinding], Evaluation]:
     result = pipeline.reconstruct(scan, rig, pipeline.Options(spectra=False))
     fit = Fit.read(result.attrs)
-    truth = scans.twin_truth(scanned[0], WavelengthGrid())
+    truth = truths.twin_truth(scanned[0], WavelengthGrid())
     assert fit is not None
     assert truth is not None
     return {f.name.split()[0]: f for f in fit.findings if "binary code" in f.name}, pipeline.evaluate(

@@ -13,7 +13,7 @@ from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.pipeline import Options, evaluate, reconstruct
 from dsl_core.simulation import sim_devices
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.workflows.scans import twin_truth
+from dsl_core.workflows.truths import twin_truth
 from tests.cases.twin_scan import twin_scan
 
 PLAN = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))

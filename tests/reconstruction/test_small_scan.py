@@ -25,7 +25,7 @@ from dsl_core.reconstruction.columns import maps as column_maps
 from dsl_core.reconstruction.columns.maps import ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.cases.grid_samples import sample_grating
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
@@ -50,7 +50,7 @@ def grid_rig(rig: Rig) -> Rig:
 
 
 def evaluate(scanned: tuple[DeviceRig, MemoryScan], cube: NDArray[np.float32]) -> Evaluation:
-    truth = scans.twin_truth(scanned[0], GRID)
+    truth = truths.twin_truth(scanned[0], GRID)
     assert truth is not None
     return pipeline.evaluate(build_result({"reflectance": cube}, GRID.centres_nm, {}), truth)
 
@@ -62,7 +62,7 @@ def test_light_outside_the_bands_asked_for_is_not_blamed_on_the_rig(
     devices, scan = scanned
     grid = WavelengthGrid(start_nm=500.0, stop_nm=600.0, step_nm=10.0)
     result = pipeline.reconstruct(scan, calibration_of(devices), pipeline.Options(grid))
-    fit, truth = Fit.read(result.attrs), scans.twin_truth(devices, grid)
+    fit, truth = Fit.read(result.attrs), truths.twin_truth(devices, grid)
     assert fit is not None
     assert truth is not None
     assert not {"film", "response", "profile"} & set(fit.parts)
@@ -134,7 +134,7 @@ def test_published_objective_is_close_and_the_banded_solver_closer(
 def test_where_no_line_reaches_a_band_the_colour_of_the_zero_order_narrows_it_down() -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
     devices, scan = twin_scan(plan, size="112x72", scene="plane")
-    rig, truth = calibration_of(devices), scans.twin_truth(devices, GRID)
+    rig, truth = calibration_of(devices), truths.twin_truth(devices, GRID)
     assert truth is not None
     assert truth.spectra is not None
     stack, pixels = solver_input(rig, scan)
@@ -181,7 +181,7 @@ def test_calibration_widens_the_deviation_and_nothing_else(scanned: tuple[Device
 def test_pixels_at_the_edge_of_a_patch_have_the_spectrum_of_their_own_side(
     scanned: tuple[DeviceRig, MemoryScan],
 ) -> None:
-    rig, truth = calibration_of(scanned[0]), scans.twin_truth(scanned[0], GRID)
+    rig, truth = calibration_of(scanned[0]), truths.twin_truth(scanned[0], GRID)
     assert truth is not None
     assert truth.material is not None
     assert truth.spectra is not None
@@ -205,7 +205,7 @@ def test_pixels_at_the_edge_of_a_patch_have_the_spectrum_of_their_own_side(
 def test_combs_fit_where_neighbouring_pixels_are_several_columns_apart() -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=LineComb(width_px=5, step_px=4, period_px=80))
     devices, scan = twin_scan(plan, size="112x72", scene="color-checker")
-    rig, truth = calibration_of(devices), scans.twin_truth(devices, GRID)
+    rig, truth = calibration_of(devices), truths.twin_truth(devices, GRID)
     assert truth is not None
     assert truth.material is not None
     assert truth.spectra is not None

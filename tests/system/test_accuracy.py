@@ -23,7 +23,7 @@ from dsl_core.reconstruction.spectral import spectra
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.reconstruction.spectral.spectral_maps import SpectralMaps
 from dsl_core.solve.threads import one_kernel_thread
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.cases.crop import cropped_twin
 from tests.cases.twin_scan import MemoryScan, capture, solver_input, twin_scan
 
@@ -52,7 +52,7 @@ def scan(
     devices = cropped_twin(scene, corner_px, size_px)
     with one_kernel_thread():
         frames = capture(devices, plan)
-    truth = scans.twin_truth(devices, GRID)
+    truth = truths.twin_truth(devices, GRID)
     assert truth is not None
     assert devices.calibration is not None
     return Scanned(devices.calibration, frames, truth)
@@ -132,7 +132,7 @@ def test_noise_model_explains_what_the_spectra_leave(maps: SpectralMaps) -> None
 def test_half_as_many_bands(chart: Scanned) -> None:
     grid = WavelengthGrid(step_nm=10.0)
     devices = cropped_twin("color-checker", CHART)
-    truth = scans.twin_truth(devices, grid)
+    truth = truths.twin_truth(devices, grid)
     assert truth is not None
     result = chart.reconstruct(grid)
     assert result.sizes["wavelength_nm"] == 24

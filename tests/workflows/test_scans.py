@@ -20,7 +20,8 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.model.rig import Provenance, Rig
 from dsl_core.patterns.images import pattern_image
 from dsl_core.workflows import scans
-from dsl_core.workflows.scans import prepare_resume, reopen_rig, resume, truth_of
+from dsl_core.workflows.scans import prepare_resume, reopen_rig, resume
+from dsl_core.workflows.truths import truth_of
 from tests.cases.memory_sink import MemorySink
 from tests.cases.small_result import small_result
 from tests.cases.small_rig import small_rig

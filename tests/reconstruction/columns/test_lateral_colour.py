@@ -26,7 +26,7 @@ from dsl_core.reconstruction.columns.lateral_colour import (
 )
 from dsl_core.simulation.sim_devices import open_twin
 from dsl_core.solve.robust import robust_linear
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.cases.twin_scan import capture
 
 LINES = LineSet.of(CapturePlan(spectral=ScanLines(width_px=5, step_px=2)))
@@ -100,7 +100,7 @@ def test_columns_are_unsure_by_the_colours_of_materials(rig: Rig) -> None:
 def test_a_scan_through_such_lenses_is_corrected_and_says_so() -> None:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=2))
     devices = open_twin({"size": "64x48", "scene": "color-checker", "foreign": "lateral-colour"})
-    scan, truth = capture(devices, plan), scans.twin_truth(devices, pipeline.Options().grid)
+    scan, truth = capture(devices, plan), truths.twin_truth(devices, pipeline.Options().grid)
     assert devices.calibration is not None
     assert truth is not None
     assert truth.depth_mm is not None

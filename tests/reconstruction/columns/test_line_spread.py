@@ -17,7 +17,7 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.lines.line_set import LineSet
 from dsl_core.reconstruction.columns.line_spread import own_spread, scene_spread, wave_std_px
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.cases.line_peaks import RUN, seen
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
@@ -29,7 +29,7 @@ def scanned() -> Scanned:
     """A chart, and its true depth."""
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=3))
     devices, scan = twin_scan(plan, size="160x104", scene="color-checker")
-    truth = scans.twin_truth(devices, pipeline.Options().grid)
+    truth = truths.twin_truth(devices, pipeline.Options().grid)
     assert devices.calibration is not None
     assert truth is not None
     assert truth.depth_mm is not None

@@ -18,7 +18,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.findings.model_findings import MOVED, TURNED
 from dsl_core.reconstruction.spectral.film_motion import PRIOR_STD, FilmMotion, with_film
 from dsl_core.reconstruction.spectral.turned import EITHER, IMPLAUSIBLE, SURELY, _belief, with_pose
-from dsl_core.workflows import scans
+from dsl_core.workflows import truths
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
 Scanned = tuple[DeviceRig, MemoryScan]
@@ -44,7 +44,7 @@ def _rig(scanned: Scanned) -> Rig:
 def _judged(scanned: Scanned, rig: Rig) -> tuple[Fit, float, float]:
     """The verdict by a rig's calibration, the share of depths in their bands, and the median deviation."""
     result = pipeline.reconstruct(scanned[1], rig, Options(WavelengthGrid(step_nm=5.0)))
-    truth, fit = scans.twin_truth(scanned[0], WavelengthGrid()), Fit.read(result.attrs)
+    truth, fit = truths.twin_truth(scanned[0], WavelengthGrid()), Fit.read(result.attrs)
     assert truth is not None
     assert truth.depth_mm is not None
     assert fit is not None

@@ -242,7 +242,7 @@ def read_side(path: Path, progress: Progress) -> Side:
 def read_truth(first: Side, progress: Progress) -> Side:
     """The ground truth of A's simulated scene as a side; raises `DecodeError` where there is none."""
     from dsl_core.io.result.result_file import load_result
-    from dsl_core.workflows.scans import truth_of
+    from dsl_core.workflows.truths import truth_of
 
     progress.report("read the ground truth", 0, 1)
     truth = truth_of(load_result(first.arrays.path))

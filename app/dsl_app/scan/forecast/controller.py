@@ -286,7 +286,7 @@ def measure(scan: MeasuredScan, result: Path) -> MeasuredScan:
     from dsl_core.evaluation.cost import costs_of
     from dsl_core.evaluation.summary import evaluate
     from dsl_core.io.result.result_file import load_result
-    from dsl_core.workflows.scans import truth_of
+    from dsl_core.workflows.truths import truth_of
 
     found = load_result(result)
     scan = replace(scan, computing_s=sum(stage.seconds for stage in costs_of(found.attrs)) or None)

@@ -13,8 +13,8 @@ from dsl_core import pipeline
 from dsl_core.errors import DecodeError, StoreError
 from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.workflows.scans import truth_of, twin_truth
 from dsl_core.workflows.series import read_sweep
+from dsl_core.workflows.truths import truth_of, twin_truth
 from tests.app.support.compare_bench import make_result
 
 
