@@ -20,7 +20,7 @@ from dsl_core.calibration.film.depth_stage import StageData, StageFilter, fit_fi
 from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.calibration.film.order_samples import OrderSamples
 from dsl_core.calibration.film.residual import choose_residual
-from dsl_core.campaign.depth_stage.recipe import lines_on_plane
+from dsl_core.campaign.depth_stage.planes import lines_on_plane
 from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import CapturePlan, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Film, Rig

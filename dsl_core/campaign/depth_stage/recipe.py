@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from dsl_core.calibration.common.tiles import ColumnSamples, tile_columns
 from dsl_core.calibration.film.depth_stage import StageData, StageFilter, calibrate_depth_stage
-from dsl_core.calibration.film.order_paths import LineFrames, thinned
+from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.calibration.geometry.plane_refinement import lone_plane
 from dsl_core.calibration.geometry.stage_planes import column_limit_px, require_steps
 from dsl_core.campaign.common.bounds import Count, FilterNm, Finite, Positive, Reflectance
 from dsl_core.campaign.common.depths import stage_depths_mm
 from dsl_core.campaign.common.flat_target import (
     diffuser_lines,
-    line_frames,
-    scan_lines_of,
-    scanned_geometry,
 )
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.same_white import keep_white, require_same_white
@@ -36,23 +29,19 @@ from dsl_core.campaign.common.white_shot import (
     shoot_white,
 )
 from dsl_core.campaign.depth_stage.figures import depth_stage_figures
+from dsl_core.campaign.depth_stage.planes import SeenPlane, lines_on_plane, seen_plane, with_lateral_colour
 from dsl_core.errors import CalibrationError
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, apply_depth_stage
 from dsl_core.model.figure import Figure
-from dsl_core.model.frames import FrameSource
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
-from dsl_core.model.result import DEPTH_INVALID, Flag
-from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import Progress
-
-if TYPE_CHECKING:
-    from dsl_core.reconstruction.columns.lateral_colour import ColumnBends
 
 STAGE_NOTE, PLANE_NOTE = "stage.json", "plane.json"
 #: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
@@ -369,48 +358,3 @@ def _filter_of(note: StageNote, fwhm_nm: float) -> StageFilter:
     assert note.transmission is not None
     curve = note.transmission if note.measured else nominal_filter(note.filter_nm, fwhm_nm)
     return StageFilter(note.filter_nm, curve, note.measured)
-
-
-@dataclass(frozen=True)
-class SeenPlane:
-    """Tile means of the zero order's columns of a plane, the lines' look, and traces of lateral colour."""
-
-    columns: ColumnSamples
-    response: ProjectorResponse
-    bends: ColumnBends | None
-
-
-def seen_plane(source: FrameSource, rig: Rig, progress: Progress | None = None) -> SeenPlane:
-    """The columns of a scan with code and lines; raises what a reconstruction raises."""
-    from dsl_core.reconstruction.columns.lateral_colour import ColumnBends
-
-    # What the geometry leaves open is common to neighbouring pixels, and is about to be found.
-    shown, _, geometry = scanned_geometry(source, rig, progress, shared_errors=False)
-    column_px = np.where((geometry.flags & int(DEPTH_INVALID)) != 0, np.nan, geometry.column_px)
-    refined = np.where((geometry.flags & int(Flag.NOT_REFINED)) != 0, np.nan, column_px)
-    return SeenPlane(
-        tile_columns(column_px, geometry.column_std_px),
-        shown.projector_response,
-        ColumnBends.of(rig, refined.astype(np.float64)),
-    )
-
-
-def with_lateral_colour(rig: Rig, seen: Sequence[SeenPlane]) -> tuple[Rig, tuple[float, float] | None]:
-    """The rig with the lateral colour that planes show, if any; how far red and blue are apart, px.
-
-    First orders are seen in one colour each, so that their film would else be fitted to it.
-    """
-    from dsl_core.reconstruction.columns.lateral_colour import fit_lateral_colour
-
-    bends = [each.bends for each in seen if each.bends is not None]
-    if not bends:
-        return rig, None
-    found = fit_lateral_colour(rig, bends)
-    colour = found.colour if found.present else None
-    return rig.model_copy(update={"lateral_colour": colour}), (found.apart_px, found.apart_std_px)
-
-
-def lines_on_plane(source: FrameSource, rig: Rig) -> LineFrames:
-    """The line frames of a scan at pixels evenly over the image; raises `CalibrationError` without lines."""
-    lines, pixels = scan_lines_of(source), thinned(source.plan.camera_size_px)
-    return LineFrames(lines, pixels, *line_frames(source, rig, pixels))

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from dsl_core.campaign.common.recipe import Bench
-from dsl_core.campaign.depth_stage.recipe import DepthStageRecipe, seen_plane, with_lateral_colour
+from dsl_core.campaign.depth_stage.planes import seen_plane, with_lateral_colour
+from dsl_core.campaign.depth_stage.recipe import DepthStageRecipe
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.progress import NoProgress
 from tests.cases.film_bench import film_bench, take_all, truth_of

@@ -11,7 +11,8 @@ import torch
 
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.campaign.common.recipe import Bench, Step
-from dsl_core.campaign.depth_stage.recipe import STAGE_NOTE, DepthStageRecipe, SeenPlane
+from dsl_core.campaign.depth_stage.planes import SeenPlane
+from dsl_core.campaign.depth_stage.recipe import STAGE_NOTE, DepthStageRecipe
 from dsl_core.devices.base import Stage
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection
