@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
 )
 #: Words for columns that hold no spectrum of their own, wherever they stand in a title.
 _BESIDE = re.compile(
-    r"deviation|abweichung|uncertain|unsicherheit|variance|λ|wave ?(?:len|num)|wvl|wellenl"
+    r"deviation|abweichung|uncertain|unsicherheit|variance|(?<!\()λ|wave ?(?:len|num)|wvl|wellenl"
     r"|\b(?:std ?(?:dev)?|st\. ?dev|errors?|sd|sem|flags?|wave|lambda|snr|fwhm|band ?widths?)\b",
     re.IGNORECASE,
 )
@@ -58,6 +59,10 @@ _COUNTER = re.compile(
     r"(?: ?(?:n[or]|number|index))?(?:(?<=\w) ?[\[(](?:%|nm|1|-)[\])])?\W*",
     re.IGNORECASE,
 )
+#: Signs of uncertainties in certificates: "U (k=2)", "u(R)", "U_c", "±". A sample may be called "U (blue)".
+_UNCERTAINTY = re.compile(r"±|\+/-|\bk ?= ?[1-3]\b|^\W*[Uu](?: ?c| ?[\[(](?:95|%|[Rrρβ]\b|rho|reflect).*)$")
+#: Titles of a column that are uncertainties behind one of these, and may be names of samples without.
+_SIGN, _OF_SIGN = re.compile(r"\W*[Uu]\W*"), re.compile(r"\W*(?:[RrTρβ]|rho)(?: ?\(.*\))?\W*")
 #: Where words of a title meet that are written together: "refl_std", "leafStd".
 _MEETING = re.compile(r"_|(?<=[a-z])(?=[A-Z])")
 
@@ -67,9 +72,24 @@ def is_beside(title: str) -> bool:
 
     >>> is_beside("leaf_std"), is_beside("CV (%)"), is_beside("camouflage"), is_beside("No. 1 red")
     (True, True, False, False)
+    >>> is_beside("U (k=2)"), is_beside("u(R)"), is_beside("U (blue)")
+    (True, True, False)
     """
     words = _MEETING.sub(" ", title)
-    return bool(_BESIDE.search(words) or (words.strip() and _COUNTER.fullmatch(words)))
+    return bool(
+        _BESIDE.search(words) or _UNCERTAINTY.search(words) or (words.strip() and _COUNTER.fullmatch(words))
+    )
+
+
+def is_sign_beside(title: str, others: Iterable[str]) -> bool:
+    """Whether "U" is the uncertainty of one of the ``others`` rather than a sample of this name.
+
+    >>> is_sign_beside("U", ["R"]), is_sign_beside("U", ["T1", "V"]), is_sign_beside("U", ["Reflectance"])
+    (True, False, True)
+    """
+    return bool(_SIGN.fullmatch(title)) and any(
+        _OF_SIGN.fullmatch(each) or _quantity(each, everywhere=True)[0] != "unstated" for each in others
+    )
 
 
 def counts_rows(title: str, values: Floats) -> bool:

@@ -15,6 +15,7 @@ from dsl_core.io.spectra.text import MIN_ROWS, Table, cells_of, decoded, is_text
 from dsl_core.io.spectra.units import (
     counts_rows,
     is_beside,
+    is_sign_beside,
     quantity_of,
     says_micrometres,
     to_nanometres,
@@ -61,6 +62,8 @@ def spectra_of(path: Path, table: Table, known: Known | None = None) -> list[Spe
     _require_no_lines(path, titles, titles[first], given[kept])
     nm = to_nanometres(path, given[kept], titles[first], table.header)
     values_of = [i for i in columns if i != first and not is_beside(titles[i])]
+    shown = [titles[i] for i in values_of]
+    values_of = [i for i in values_of if not is_sign_beside(titles[i], shown)]
     spectra = []
     for i in values_of:
         values = table.cells[kept, i]
