@@ -12,7 +12,7 @@ from dsl_core.model.fit import FitFinding
 from dsl_core.model.plan import CapturePlan
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
-from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.reconstruction.hdr import MergedFrame, setting_gains_ms
 from dsl_core.reconstruction.light.course import LightCourse, light_course
 from dsl_core.reconstruction.light.heard import Witness
 from dsl_core.reconstruction.light.line_levels import LineLevels, candidates, line_levels
@@ -78,10 +78,25 @@ class _Scan:
         """The lines of the chosen pixels."""
         return self.frames.pick(self._pixels, self._progress)
 
+    def _leak(self) -> NDArray[np.floating]:
+        """The projector's light in a black picture, as pictures of its setting are merged, DN per ms.
+
+        Where it is not calibrated, all light in that picture may be; the room's makes levels differ less.
+        """
+        rig, settings = self.frames.rig, self.frames.plan.settings
+        gains_ms = setting_gains_ms(settings, rig.projector_response)
+        longest = int(np.argmax(gains_ms))
+        black = self.frames.source.read(self.frames.shots_of("black", 0)[longest])
+        dark_dn = black.astype(np.float32) - rig.sensor.black_level_dn
+        share = rig.projector_response.radiance(0.0)
+        if share > 0:
+            dark_dn = np.minimum(dark_dn, self.white.radiance * share * settings[longest].exposure_ms)
+        return dark_dn / float(gains_ms[longest])
+
     def levels(self) -> LineLevels | None:
         """How bright each line was; None where lines do not add up to white."""
         white = (self.white.radiance, self.white.variance)
-        levels = line_levels(self.frames.plan, self.code.column, white, self.lines())
+        levels = line_levels(self.frames.plan, self.code.column, white, self.lines(), self._leak())
         return None if levels is None or levels.misfit > MOST_MISFIT else levels
 
 

@@ -62,11 +62,12 @@ def line_levels(
     column: NDArray[np.integer],
     white: tuple[NDArray[np.floating], NDArray[np.floating]],
     seen: PickedLines,
+    leak: NDArray[np.floating] | float = 0.0,
 ) -> LineLevels | None:
     """Levels of the frames, from `candidates`; None where the patterns or the picture do not tell.
 
     ``column`` is the projector column of each pixel (negative: unknown), ``white`` radiance and variance,
-    both of the whole picture.
+    both of the whole picture; so is ``leak``, the projector's light in a black picture.
     """
     if isinstance(plan.spectral, NoSpectral):
         return None
@@ -89,11 +90,13 @@ def line_levels(
     usual = np.polyval(np.polyfit(summed, light_variance, 1), summed).clip(light_variance.min())
     noise = (SUM_ERROR * summed) ** 2 + mean**2 * usual + blacks**2
     pitch = pitch_of(column)
-    smooth, smooth_std = _smooth_rows(plan, flat, frames, variance, pitch)
+    # What gets through the projector flickers as well: of faint first orders it is most of the light.
+    whole = frames + np.broadcast_to(leak, column.shape).ravel()[picked].astype(np.float64)[:, None]
+    smooth, smooth_std = _smooth_rows(plan, flat, whole, variance, pitch)
     if 1.1 * _quick(smooth, smooth_std) > LEAST_SPREAD:
         upper = picked < np.median(picked)
         halves = (
-            _smooth_rows(plan, flat[half], frames[half], variance[half], pitch)[0] for half in (upper, ~upper)
+            _smooth_rows(plan, flat[half], whole[half], variance[half], pitch)[0] for half in (upper, ~upper)
         )
         if not _agree(*halves):
             return None
@@ -195,7 +198,7 @@ def _smooth_rows(
 ) -> tuple[Floats, Floats]:
     """Equations (n, frames) that the inverse levels fulfil, and how well; none for several lines a frame.
 
-    ``column`` is (pixels,), ``frames`` and ``variance`` are (pixels, frames).
+    ``column`` is (pixels,), ``frames``, all light of the projector, and ``variance`` are (pixels, frames).
     """
     count = frames.shape[1]
     if not isinstance(plan.spectral, ScanLines) or count < 16:
