@@ -24,7 +24,9 @@ class Reconstructor:
     def __init__(self, state: ScanState, runner: JobRunner, notifier: Notifier, pace: Pace) -> None:
         """Keep the parts; the ``pace`` learns from each reconstruction."""
         self._state, self._runner, self._notifier, self._pace = state, runner, notifier, pace
-        #: The depth of the reconstruction that runs, from its thread; news until it is in the state.
+        #: The scan that was started last: its depth is shown, not that of others that still run.
+        self._latest: Path | None = None
+        #: The depth of that one, from its thread; news until it is in the state.
         self._seen_depth: NDArray[np.float32] | None = None
         self._running = 0
         self._stop_expecting = state.plan.follow(self._expect)
@@ -49,7 +51,7 @@ class Reconstructor:
             state.result.emit(path)
 
         def finish(note: str) -> None:
-            self._finish()
+            self._finish(session)
             # Another scan may have set a note of its own meanwhile.
             if state.note.value == waiting:
                 state.note.set(note)
@@ -69,6 +71,7 @@ class Reconstructor:
             return self._reconstruct(session, progress)
 
         state.note.set(waiting)
+        self._show_none(session)
         self._running += 1
         state.is_reconstructing.set(True)
         self._runner.submit(Job(f"Reconstruct {session.stem}", work, done, failed, cancelled))
@@ -77,16 +80,20 @@ class Reconstructor:
         from dsl_core.workflows.scans import reconstruct_to
 
         def see(maps: Maps) -> None:
-            self._seen_depth = np.asarray(maps["depth_mm"], np.float32)
+            if session == self._latest:
+                self._seen_depth = np.asarray(maps["depth_mm"], np.float32)
 
         return reconstruct_to(result_beside(session), session, progress=progress, seen_geometry=see)
 
-    def _finish(self) -> None:
+    def _finish(self, session: Path) -> None:
         self._running -= 1
-        if self._running:
-            return
-        self._seen_depth = None
-        self._state.is_reconstructing.set(False)
+        self._state.is_reconstructing.set(self._running > 0)
+        if session == self._latest:
+            self._show_none(None)
+
+    def _show_none(self, latest: Path | None) -> None:
+        """Show no depth until the latest scan has one."""
+        self._latest, self._seen_depth = latest, None
         self._state.depth.set(None)
 
     def _expect(self, plan: CapturePlan) -> None:

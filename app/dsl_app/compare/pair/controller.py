@@ -187,12 +187,22 @@ class PairController:
 
     # Report ----------------------------------------------------------------------------------------
 
-    def write_report(self, target: Path) -> None:
-        """Write the report of A against its ground truth, or against another result, as an HTML page."""
+    def write_report(self, target: Path, asked: Pair | None = None) -> None:
+        """Write the report of A against its ground truth, or against another result, as an HTML page.
+
+        Nothing is written if the pair is no longer the one that was ``asked`` for.
+        """
         pair = self.state.pair.value
         if pair is None:
             self._notifier.tell(
                 "info", "A report needs two results that can be compared. Choose A and B first."
+            )
+            return
+        if asked is not None and asked is not pair:
+            self._notifier.tell(
+                "warning",
+                "The results have changed while you chose a file. Look at the new figures, then write the"
+                " report.",
             )
             return
         if self.read_again():

@@ -119,7 +119,7 @@ class PairPanel(QWidget):
         start = pair.first.arrays.path.with_suffix(".html")
         path = ask_place(self, "Write the report", str(start), "Web page (*.html)")
         if path is not None:
-            self._control.write_report(path)
+            self._control.write_report(path, pair)
 
     def _show(self) -> None:
         show_parts(self, pair_display(self._state))

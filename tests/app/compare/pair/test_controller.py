@@ -173,10 +173,14 @@ def test_a_result_that_is_replaced_is_read_again_and_reported_only_as_seen(
     compare.open(moved(results[0], tmp_path / "again.zarr", 1.0))
     compare.open(results[0])
     assert not compare.read_again()
+    before = compare.state.pair.value
     moved(results[0], tmp_path / "again.zarr", 5.0)
     compare.write_report(tmp_path / "r.html")
     assert not (tmp_path / "r.html").exists()
     assert "was replaced" in notifier.told[-1][1]
+    compare.write_report(tmp_path / "r.html", before)
+    assert not (tmp_path / "r.html").exists()
+    assert "while you chose a file" in notifier.told[-1][1]
     pair = compare.state.pair.value
     assert pair is not None
     assert float(np.nanmean(pair.first.arrays["depth_mm"] - pair.second.arrays["depth_mm"])) > 4.9

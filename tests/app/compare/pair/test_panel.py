@@ -129,10 +129,10 @@ def test_a_report_without_an_ending_gets_that_of_a_page(
         control.open_side(chart, second)
         qtbot.waitUntil(lambda: not state.busy.value, timeout=20_000)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "report"), ""))
-    written: list[Path] = []
-    monkeypatch.setattr(control, "write_report", written.append)
+    written: list[tuple[Path, Pair | None]] = []
+    monkeypatch.setattr(control, "write_report", lambda *given: written.append(given))
     page.report.click()
-    assert written == [tmp_path / "report.html"]
+    assert written == [(tmp_path / "report.html", state.pair.value)]
 
 
 @pytest.mark.slow
