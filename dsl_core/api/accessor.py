@@ -206,12 +206,18 @@ class ResultAccessor:
         returned; of a region the band is that of its pixels. Raises `DecodeError` where no pixel is said.
         """
         import matplotlib.pyplot as plt
+        from matplotlib.axes import Axes
 
         self._require_spectra()
         shown = self._result if x is None or y is None else self.spectrum(x, y)
         if shown["reflectance"].ndim != 1:
             raise DecodeError("Say which pixel to draw: plot(x=..., y=...), or spectrum(x, y).dsl.plot().")
         axes = plt.gca() if ax is None else ax
+        if not isinstance(axes, Axes):
+            raise DecodeError(
+                "ax is one of the axes of matplotlib, such as plt.subplots()[1]; what was given is of type"
+                f" {type(axes).__name__}."
+            )
         nm, mean = shown["wavelength_nm"].values, shown["reflectance"].values
         half = BAND_95 * shown["reflectance_std"].values
         (line,) = axes.plot(nm, mean, label=str(shown.attrs.get("name", "")))
@@ -265,7 +271,10 @@ def _flags(result: xr.Dataset) -> xr.DataArray:
     """Flags of the pixels; a result without any shows no more than which pixels it has values of."""
     if "flags" in result:
         return with_bits(result[["flags"]])["flags"]
-    known = (result["depth_mm"] if "depth_mm" in result else result["reflectance"]).notnull()
+    seen = next((name for name in ("depth_mm", "reflectance") if name in result), None)
+    if seen is None:
+        raise DecodeError("The result has no flags, no depth and no spectra, which would say what is good.")
+    known = result[seen].notnull()
     known = known.all(BANDS) if BANDS in known.dims else known
     return known.copy(data=np.where(known.values, 0, int(Flag.NON_FINITE)))
 

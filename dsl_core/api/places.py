@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
+from dsl_core.model.result_order import BANDS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,10 +76,22 @@ def require_picture(result: xr.Dataset) -> None:
     lacking = [axis for axis in _AXES if axis not in result.dims]
     if len(lacking) == 2:
         raise DecodeError("This is one spectrum, not a result: it has no pixels to choose from.")
+    seen = (result[name].dims for name in ("depth_mm", "reflectance") if name in result)
+    others = sorted({str(axis) for dims in seen for axis in dims} - {*_AXES, BANDS})
+    if lacking and others:
+        raise DecodeError(
+            f"The result has no axis {lacking[0]}; pixels are over {', '.join(others)}. Rename the axis,"
+            f" such as result.rename({others[0]}={lacking[0]!r})."
+        )
     if lacking:
         raise DecodeError(
             f"The result has no axis {lacking[0]}, since one {lacking[0]} of it was chosen. Choose a list of"
             f" one, such as result.isel({lacking[0]}=[30]), which keeps the axis."
+        )
+    if others:
+        raise DecodeError(
+            f"The result has one more axis than a picture, {others[0]}. Choose one along it, such as"
+            f" result.isel({others[0]}=0)."
         )
 
 

@@ -35,6 +35,24 @@ class _Stack:
         return np.asarray(self.frames[shot.index])
 
 
+def _grey(picture: ArrayLike) -> NDArray[np.number]:
+    """A picture as numbers: true is white in pictures of one bit."""
+    values = np.asarray(picture)
+    return np.multiply(values, 255) if values.dtype == bool else values
+
+
+def _columns_of(given: ArrayLike) -> NDArray[np.float64]:
+    """Columns as numbers, NaN where they are masked; raises `DecodeError` for what are none."""
+    try:
+        # Not by asarray, which takes what is behind a mask for a column.
+        return np.ma.filled(np.ma.asarray(given).astype(np.float64), np.nan)
+    except (ValueError, TypeError) as error:
+        raise DecodeError(
+            "Columns are an array of numbers (rows, columns), such as column_px of a result; what was given"
+            f" is of type {type(given).__name__}."
+        ) from error
+
+
 def decode_stack(
     pictures: Sequence[ArrayLike],
     code: CodeSet,
@@ -46,17 +64,14 @@ def decode_stack(
 
     Noise is that of a common sensor of 8 bits or, where values are larger, 16. Raises `DecodeError`.
     """
-    # True is white, as in pictures of one bit.
-    arrays = [
-        np.multiply(each, 255) if np.asarray(each).dtype == bool else np.asarray(each) for each in pictures
-    ]
+    arrays = [_grey(each) for each in pictures]
     if not arrays or any(each.ndim != 2 or each.shape != arrays[0].shape for each in arrays):
         shapes = ", ".join(sorted({str(each.shape) for each in arrays})) or "none"
         raise DecodeError(f"Pictures must be grey and of one size (rows, columns), given {shapes}.")
     stack = np.stack(arrays)
     lights = [
-        stack.max(0) if white is None else np.asarray(white),
-        stack.min(0) if black is None else np.asarray(black),
+        stack.max(0) if white is None else _grey(white),
+        stack.min(0) if black is None else _grey(black),
     ]
     if any(each.shape != stack.shape[1:] for each in lights):
         raise DecodeError(f"White and black must have the size of the pictures, {stack.shape[1:]}.")
@@ -145,7 +160,7 @@ def depth_of_columns(calibration: Rig | GeometryCalibration, column_px: ArrayLik
             f" of type {type(calibration).__name__}."
         )
     rig = calibration if isinstance(calibration, Rig) else _rig_for_depth(calibration)
-    column = np.asarray(column_px, np.float64)
+    column = _columns_of(column_px)
     if column.shape != (rig.camera.height_px, rig.camera.width_px):
         raise DecodeError(
             f"The columns have shape {column.shape}; the camera of {rig.name!r} has"

@@ -131,3 +131,24 @@ def test_dim_pictures_of_our_own_code_have_deviations_that_hold() -> None:
     assert known.mean() > 0.55
     assert np.median(std[known]) > 0.3
     assert (off[known] > 3).mean() < 0.015
+
+
+def test_columns_behind_a_mask_have_no_depth_and_words_are_no_columns() -> None:
+    rig = small_rig()
+    shape = (rig.camera.height_px, rig.camera.width_px)
+    mask = np.zeros(shape, bool)
+    mask[1] = True
+    column = np.full(shape, rig.projector.width_px / 2)
+    depth = depth_of_columns(rig, np.ma.masked_array(column, mask))
+    assert np.isnan(depth[mask]).all()
+    assert np.array_equal(depth[~mask], depth_of_columns(rig, column)[~mask], equal_nan=True)
+    for given in ("a", [[1.0, 2.0], [3.0]]):
+        with pytest.raises(DecodeError, match="an array of numbers"):
+            depth_of_columns(rig, given)
+
+
+def test_white_and_black_of_one_bit_are_those_of_pictures_of_one_bit() -> None:
+    code = CapturedCode(column_sets=(Stripes(code="binary", bits=2, inverse=False),))
+    shown = np.array([[[0, 0, 1, 1]], [[0, 1, 0, 1]]], bool)
+    found = decode_stack(list(shown), code, (4, 1), np.ones((1, 4), bool), np.zeros((1, 4), bool))
+    assert found["column_px"].values.round(2).tolist() == [[0.0, 1.0, 2.0, 3.0]]
