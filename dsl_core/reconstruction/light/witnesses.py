@@ -86,11 +86,11 @@ def colours_of_whites(scan: Pictures) -> Iterator[ColoursAgain]:
         # A monochrome camera lacks two colours, and a picture of one row or column lacks one.
         if np.bincount(channels.ravel(), minlength=3).min() < FEWEST:
             return
-        bright = np.zeros(first.shape, bool)
+        bright, both = np.zeros(first.shape, bool), (first + now) / 2
         for colour in range(3):
             own = channels == colour
-            bright |= own & (first > 0.25 * np.percentile(first[own], 95))
-        used = bright & (first < limit) & (now < limit) & (now > 0)
+            bright |= own & (both > 0.25 * np.percentile(both[own], 95))
+        used = bright & (first < limit) & (now < limit) & (first > 0) & (now > 0)
         each = [used & (channels == colour) for colour in range(3)]
         if min(int(own.sum()) for own in each) < FEWEST:
             continue
@@ -123,7 +123,9 @@ def _compared(
     scan: Pictures, shot: Shot, old: Shot, first: NDArray[np.floating], now: NDArray[np.floating]
 ) -> Witness:
     limit = 0.9 * scan.rig.sensor.full_scale_dn
-    used = (first > 0.25 * np.percentile(first, 95)) & (first < limit) & (now < limit)
+    # Chosen by one of them, noise would make that one brighter.
+    both = (first + now) / 2
+    used = (both > 0.25 * np.percentile(both, 95)) & (first < limit) & (now < limit)
     sums = [max(float(each[used].sum(dtype=np.float64)), 1.0) for each in (now, first)]
     noise = [float(raw_variance(scan.rig.sensor, each[used]).sum(dtype=np.float64)) for each in (now, first)]
     std = np.sqrt(noise[0] / sums[0] ** 2 + noise[1] / sums[1] ** 2)

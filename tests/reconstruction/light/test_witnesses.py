@@ -53,11 +53,12 @@ def test_whites_are_compared_where_both_are_bright_and_neither_is_saturated() ->
     first = rng.uniform(0.3, 0.5, (6, 10)) * full
     now = 1.04 * first
     used = np.ones(first.shape, bool)
-    for place, (a, b) in {(0, 0): (0.91, 0.5), (0, 1): (0.5, 0.91), (0, 2): (0.1, 0.7)}.items():
+    for place, (a, b) in {(0, 0): (0.91, 0.5), (0, 1): (0.5, 0.91), (0, 2): (0.1, 0.02)}.items():
         first[place], now[place], used[place] = a * full, b * full, False
-    first[0, 3] = now[0, 3] = 0.26 * np.percentile(first, 95)
+    first[0, 3] = now[0, 3] = 0.28 * np.percentile(first, 95)
     first[0, 4] = now[0, 4] = 0.88 * full
     first[0, 5], used[0, 5] = 0.24 * np.percentile(first, 95), False
+    now[0, 5] = first[0, 5]
     found = witnesses._compared(scan_of(), shot, old, first, now)
     sums = now[used].sum(), first[used].sum()
     assert (found.shot, found.against) == (shot.index, old.index)
@@ -69,6 +70,15 @@ def test_whites_are_compared_where_both_are_bright_and_neither_is_saturated() ->
     # Of the dark nothing is known, and nothing is divided by zero.
     dark = witnesses._compared(scan_of(), shot, old, 0 * first, 0 * now)
     assert (dark.log, dark.std) == (0.0, 0.0)
+
+
+def test_noise_does_not_choose_the_pixels_in_which_whites_are_compared() -> None:
+    """Those that it made bright enough in the first white would be darker in the second."""
+    rng = np.random.default_rng(4)
+    light = rng.uniform(20, 320, (100, 100))
+    first, now = (light + rng.normal(0, 80, light.shape) for _ in range(2))
+    shots = shots_of("white", 0)
+    assert abs(witnesses._compared(scan_of(), shots[0], shots[-1], first, now).log) < 0.01
 
 
 def test_white_is_compared_with_white_less_the_black_next_to_each(monkeypatch: pytest.MonkeyPatch) -> None:
