@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from dsl_core.model.rig import Rig
     from dsl_core.planning.choice import Weighed
 
+#: A plan that is expected to give depth to less of the picture is told to.
+FULL_COVERAGE = 0.9
+
 
 def tradeoff(
     budget: Annotated[
@@ -69,7 +72,8 @@ def tradeoff(
             known, plans, view, latency_ms=latency_ms, budget_s=limit_s, progress=progress, store=store
         )
     chosen = choose(weighed, budget_s, error)
-    _tell(output, pareto(weighed), chosen)
+    front = pareto(weighed)
+    _tell(output, front if chosen in front else sorted([*front, chosen], key=_seconds), chosen)
     if view is None or view.black_dn_per_ms is None:
         output.say(
             "This is for a dark room: a scan made in the light of yours, as --look, tells what it costs."
@@ -180,6 +184,10 @@ def _calibration(devices: DeviceRig, name: str | None) -> Rig:
     return known
 
 
+def _seconds(weighed: Weighed) -> float:
+    return weighed.expected.seconds
+
+
 def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:
     rows = [
         (
@@ -203,5 +211,10 @@ def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:
         f"Chosen: {chosen.plan.name}: {e.frames} frames in {e.seconds:.0f} s, expected reflectance error"
         f" {e.pixel_rmse:.4f} per pixel, depth {e.depth_std_mm:.2f} mm, {e.computing_s:.0f} s of computing."
     )
+    if e.coverage < FULL_COVERAGE:
+        output.say(
+            f"Only {e.coverage:.0%} of the picture is expected to get a depth and a spectrum: the rest is too"
+            " dark or too bright for this plan. Choose longer or shorter exposures, or more or less light."
+        )
     output.put(chosen=chosen.plan.name, expected=e.model_dump())
     output.put(front=[{"plan": each.plan.name, **each.expected.model_dump()} for each in front])

@@ -253,8 +253,16 @@ def _score(sample: _Sample, bands: Floats) -> PatchScore:
         pixel_rmse=float(np.sqrt(np.mean(pixels.rmse**2))),
         pixel_angle_rad=float(pixels.angle_rad.mean()),
         truth_peak=truth_peak,
-        peak=peak_width(bands, mean) if truth_peak else None,
+        peak=_peak_of(bands, mean) if truth_peak else None,
     )
+
+
+def _peak_of(bands: Floats, mean: Floats) -> Peak | None:
+    """The peak of a measured spectrum; None where it is too flat to have one."""
+    try:
+        return peak_width(bands, mean)
+    except DecodeError:
+        return None
 
 
 def _narrow_peak(bands: Floats, truth: Floats) -> Peak | None:

@@ -48,6 +48,11 @@ BRACKETS: tuple[Exposures, ...] = (
 )
 
 
+#: Plans that give depth to less than this share of what the best of them reaches are no choice: their figures
+#: are of the few pixels that are left.
+COVERING = 0.9
+
+
 @dataclass(frozen=True)
 class Weighed:
     """A plan and what is expected of it."""
@@ -96,20 +101,28 @@ def weigh(
 
 
 def pareto(weighed: Sequence[Weighed]) -> list[Weighed]:
-    """The plans worth their time: none is both quicker and more accurate."""
-    points = [(each.expected.seconds, each.expected.pixel_rmse) for each in weighed]
-    return [weighed[i] for i in front(points)]
+    """The plans worth their time: none that covers the picture is both quicker and more accurate."""
+    able = covering(weighed)
+    return [able[i] for i in front([(each.expected.seconds, each.expected.pixel_rmse) for each in able])]
+
+
+def covering(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """The plans that give depth to about as much of the picture as any of them does."""
+    most = max((each.expected.coverage for each in weighed), default=0.0)
+    return [each for each in weighed if each.expected.coverage >= COVERING * most]
 
 
 def choose(weighed: Sequence[Weighed], budget_s: float | None = None, error: float | None = None) -> Weighed:
     """The quickest plan with at most ``error`` (pixel RMSE), or the most accurate within the budget.
 
+    Both are sought among those that cover the picture.
     Raises `PlanError` that says what could be had.
     """
     able = [each for each in weighed if budget_s is None or each.expected.seconds <= budget_s]
     if budget_s is not None and not able:
         quickest = min(weighed, key=lambda each: each.expected.seconds)
         raise _too_slow(budget_s, quickest.plan, quickest.expected.seconds)
+    able = covering(able)
     best = min(able, key=lambda each: (each.expected.pixel_rmse, each.expected.seconds))
     if error is None:
         return best

@@ -11,7 +11,6 @@ from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.series_page import over_seconds
 from dsl_core.io.staging import write_text
 from dsl_core.planning.choice import Weighed, pareto
-from dsl_core.solve.front import front
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +41,7 @@ def _plot(weighed: Sequence[Weighed], chosen: Weighed, axes: Axes) -> None:
     points = [(each.expected.seconds, each.expected.pixel_rmse) for each in weighed]
     seconds, errors = zip(*points, strict=True)
     axes.scatter(seconds, errors, s=12, color=COLOURS["plan"], label="predicted")
-    line = [points[i] for i in front(points)]
+    line = [(each.expected.seconds, each.expected.pixel_rmse) for each in pareto(weighed)]
     axes.plot(*zip(*line, strict=True), color=COLOURS["front"], label="none is better in both")
     mark = chosen.expected
     axes.scatter([mark.seconds], [mark.pixel_rmse], s=80, marker="*", color=COLOURS["chosen"], label="chosen")

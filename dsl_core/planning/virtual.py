@@ -257,7 +257,8 @@ class VirtualPixels:
         noisy = clean + rounding + noise + black_noise
         dark = self.bracket.variance(torch.zeros_like(black), black) * self.factors
         variance = self.bracket.variance(noisy, black, clean)
-        offset = dark[..., 0]
+        # Where black saturates in every setting, no frame tells anything, and no offset matters.
+        offset = torch.where(torch.isfinite(dark), dark, 0.0)[..., 0]
         return Draw(
             nodes, first, zero, black, noisy, variance, saturated, black_noise, offset, rounding, random
         )  # fmt: skip

@@ -184,3 +184,13 @@ def test_a_band_that_no_pixel_has_leaves_the_others_judged(known: Any) -> None:
     holes = known.result.assign(reflectance=cube.where(chequered))
     with pytest.raises(DecodeError, match="No pixel of ramp, filter has all bands"):
         evaluate(holes, known.truth).mean("rmse")
+
+
+def test_a_filter_that_is_measured_without_any_peak_has_no_width_and_all_other_figures(known: Any) -> None:
+    dark = known.result.copy(deep=True)
+    narrow = known.truth.material == 1
+    dark["reflectance"] = dark["reflectance"].where(~narrow, 0.0)
+    ramp, flat = evaluate(dark, known.truth).patches
+    assert flat.truth_peak is not None
+    assert flat.peak is None
+    assert ramp.rmse == evaluate(known.result, known.truth).patches[0].rmse

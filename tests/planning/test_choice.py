@@ -39,11 +39,11 @@ from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.front import front
 
 
-def weighed(seconds: float, error: float) -> Weighed:
+def weighed(seconds: float, error: float, coverage: float = 1.0) -> Weighed:
     expected = Prediction(
         frames=10, spectral_frames=5, seconds=seconds, raw_bytes=1, computing_s=1, rmse=error,
         pixel_rmse=error, angle_rad=0, pixel_angle_rad=0, delta_e=0, fwhm_nm=None, depth_std_mm=1,
-        coverage=1, decided=1,
+        coverage=coverage, decided=1,
     )  # fmt: skip
     return Weighed(CapturePlan(name=f"{seconds:g} s"), expected)
 
@@ -60,6 +60,15 @@ def test_a_budget_gets_the_most_accurate_and_an_error_the_quickest() -> None:
     assert choose(PLANS, budget_s=45).plan.name == "30 s"
     assert choose(PLANS, error=0.035).plan.name == "30 s"
     assert choose(PLANS, budget_s=100).plan.name == "60 s"
+
+
+def test_a_plan_that_leaves_most_of_the_picture_without_depth_is_no_choice() -> None:
+    """Its error is that of the few pixels that it has left."""
+    few = weighed(20, 0.001, coverage=0.3)
+    assert choose([*PLANS, few], budget_s=45).plan.name == "30 s"
+    assert choose([*PLANS, few], error=0.035).plan.name == "30 s"
+    assert few not in pareto([*PLANS, few])
+    assert choose([few, weighed(10, 0.01, coverage=0.31)]) is few
 
 
 def test_what_cannot_be_had_is_refused_with_what_can() -> None:

@@ -114,3 +114,13 @@ def test_pictures_of_few_pixels_tell_as_much_of_combs(shifts_px: tuple[int, int,
         found.append(predict(rig, plan(comb), trial_samples(rig, chart), peaks=False))
     assert found[1].pixel_rmse == pytest.approx(found[0].pixel_rmse, rel=0.3)
     assert found[1].rmse == pytest.approx(found[0].rmse, rel=0.4)
+
+
+def test_black_that_saturates_is_a_plan_without_depth_and_no_crash() -> None:
+    rig = published_rig()
+    rig = rig.model_copy(update={"white_scale": 100 * rig.white_scale})
+    comb = LineComb(width_px=6, step_px=4, period_px=64)
+    found = predict(
+        rig, plan(comb, Setting(exposure_ms=2000.0, level=0.4)), plane_samples(rig, grid=(2, 1)), peaks=False
+    )
+    assert found.coverage == 0.0
