@@ -68,9 +68,9 @@ def _predict(
 ) -> Prediction:
     pixels = VirtualPixels(rig, plan, grid, view)
     nodes = _nodes(view, pixels.bands)
-    outcome = pixels.run(nodes, *pixels.signals(torch.as_tensor(nodes, dtype=torch.float32)))
+    outcome, patch = _both(pixels, nodes, *pixels.signals(torch.as_tensor(nodes, dtype=torch.float32)))
     nm = grid.centres_nm
-    calm, rough = (_Errors.of(each, outcome, nm) for each in (outcome.unbiased, outcome.mean))
+    calm, rough = (_Errors.of(each, outcome, nm) for each in (patch, outcome.mean))
     level = float(np.sqrt((outcome.truth**2).mean()))
     return Prediction(
         frames=plan.shot_count,
@@ -88,6 +88,14 @@ def _predict(
         coverage=view.lit_share * float(outcome.lit.mean()),
         decided=float((outcome.data_share >= DECIDED_FROM).mean()),
     )
+
+
+def _both(
+    pixels: VirtualPixels, nodes: Floats, first: torch.Tensor, zero: torch.Tensor
+) -> tuple[Outcome, Floats]:
+    """Virtual pixels, and the mean spectra (bands, samples, spectra) of many of each."""
+    one, other = (pixels.run(nodes, first, zero, sign) for sign in (1, -1))
+    return one, (one.mean + other.mean) / 2
 
 
 def _nodes(view: SamplePixels, bands: Bands) -> Floats:
@@ -130,9 +138,9 @@ def _width(rig: Rig, plan: CapturePlan, grid: WavelengthGrid, view: SamplePixels
     fine = Bands.of(rig, WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=FINE_STEP_NM))
     filters = references.peaks()
     true, nodes = (np.tile(filters.at(bands.centres_nm), (len(some), 1, 1)) for bands in (fine, pixels.bands))
-    outcome = pixels.run(nodes, *pixels.signals(torch.as_tensor(true, dtype=torch.float32), fine))
+    signals = pixels.signals(torch.as_tensor(true, dtype=torch.float32), fine)
     widths = []
-    for spectrum in outcome.unbiased.mean(1).T:
+    for spectrum in _both(pixels, nodes, *signals)[1].mean(1).T:
         try:
             widths.append(peak_width(grid.centres_nm, spectrum).fwhm_nm)
         except DecodeError:  # too faint or too wide to have a half maximum

@@ -65,12 +65,11 @@ DARK = 1e-4
 class Outcome:
     """What the reconstruction would find, each for (samples, spectra) virtual pixels.
 
-    Spectra and ``data_share`` have bands first; ``unbiased`` is without noise, the mean of a patch.
+    Spectra and ``data_share`` have bands first.
     """
 
     truth: NDArray[np.float64]
     mean: NDArray[np.float64]
-    unbiased: NDArray[np.float64]
     std: NDArray[np.float64]
     data_share: NDArray[np.float64]
     depth_error_mm: NDArray[np.float64]
@@ -94,7 +93,7 @@ class Draw:
     noise, ``black`` (one frame) the light of black frames; ``noisy`` is what is read, with the stated
     ``variance`` of its mosaic; ``black_noise`` is what the black frames' noise adds to it, whose variance,
     common to all frames, is ``offset_variance`` (samples, spectra, 3); ``rounding`` is what a coarse sensor
-    adds to all pixels of equal light; more is drawn from ``random``.
+    adds to all pixels of equal light; more is drawn from ``random``. A ``sign`` of -1 mirrors all of it.
     """
 
     nodes: Tensor
@@ -108,10 +107,11 @@ class Draw:
     offset_variance: Tensor
     rounding: Tensor
     random: torch.Generator
+    sign: int = 1
 
     def normal(self, shape: torch.Size | tuple[int, ...]) -> Tensor:
         """The next numbers of a standard normal distribution."""
-        return torch.randn(shape, generator=self.random)
+        return self.sign * torch.randn(shape, generator=self.random)
 
 
 class VirtualPixels:
@@ -211,19 +211,22 @@ class VirtualPixels:
         zero = self.zero_at(self.column.to(self.shading), model=model)
         return first * shading, torch.einsum("scfj,srj->srcf", zero, spectra) * shading
 
-    def run(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor) -> Outcome:
-        """Reconstruct virtual pixels of truth ``spectra`` (samples, spectra, bands inside) from signals."""
-        draw = self._draw(spectra, first, zero)
+    def run(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor, sign: int = 1) -> Outcome:
+        """Reconstruct virtual pixels of truth ``spectra`` (samples, spectra, bands inside) from signals.
+
+        With a ``sign`` of -1 all errors that are drawn are those of 1 the other way round. The mean of both
+        has none of them, and all that noise does to the mean of a patch.
+        """
+        draw = self._draw(spectra, first, zero, sign)
         column, error_px = self._columns(draw)
         depth_error = error_px.double() * self.slope_mm[:, None]
         # Of what the reconstruction grants its linear model as error, what scatters is drawn as well.
         base = draw.noisy + self.scatter * MODEL_ERROR * draw.noisy * draw.normal(draw.noisy.shape)
-        clean = draw.first + draw.zero + draw.rounding
         if self.model.single:
             # Zero order and halo are subtracted; the unlit frames between the orders give the dark offset.
-            base, clean = base - draw.zero - (draw.black_noise if self.has_unlit else 0.0), clean - draw.zero
+            base = base - draw.zero - (draw.black_noise if self.has_unlit else 0.0)
         amplitude = column.amplitude_std.reshape(error_px.shape)
-        found, calm = self._solve(draw, base, clean, error_px, amplitude)
+        found = self._solve(draw, base, error_px, amplitude)
         scale = 1 / (1 + self._shading_error(draw, column, depth_error))
         true = column.column_px.reshape(error_px.shape) - error_px
         lit = self._lit(draw, true, column.refined.reshape(error_px.shape))
@@ -234,11 +237,11 @@ class VirtualPixels:
 
         truth = np.moveaxis(spectra[..., self.bands.reported], 2, 0)
         return Outcome(
-            truth, of(found.mean) * scale.numpy(), of(calm.mean), of(found.std), of(found.data_share),
-            depth_error.numpy(), lit.numpy(),
+            truth, (of(found.mean) * scale.numpy()).clip(*self.prior.bounds), of(found.std),
+            of(found.data_share), depth_error.numpy(), lit.numpy(),
         )  # fmt: skip
 
-    def _draw(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor) -> Draw:
+    def _draw(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor, sign: int) -> Draw:
         random = torch.Generator().manual_seed(0)
         nodes, clean = like(spectra, self.shading), first + zero
         black = self._black(nodes)[..., None]
@@ -253,14 +256,14 @@ class VirtualPixels:
         weights, floors = self.bracket.black_weights(clean, black), self.bracket.floors(black)
         # The noise of the black frames is common to all frames of a pixel.
         common = torch.randn(floors.shape, generator=random) * (floors * self.factors).sqrt()
-        black_noise = -(weights * common).sum(0)
-        noisy = clean + rounding + noise + black_noise
+        black_noise = -sign * (weights * common).sum(0)
+        noisy = clean + rounding + sign * noise + black_noise
         dark = self.bracket.variance(torch.zeros_like(black), black) * self.factors
         variance = self.bracket.variance(noisy, black, clean)
         # Where black saturates in every setting, no frame tells anything, and no offset matters.
         offset = torch.where(torch.isfinite(dark), dark, 0.0)[..., 0]
         return Draw(
-            nodes, first, zero, black, noisy, variance, saturated, black_noise, offset, rounding, random
+            nodes, first, zero, black, noisy, variance, saturated, black_noise, offset, rounding, random, sign
         )  # fmt: skip
 
     def _columns(self, draw: Draw) -> tuple[Column, Tensor]:
@@ -271,6 +274,8 @@ class VirtualPixels:
         samples, count, _, frames = draw.noisy.shape
         offsets = torch.linspace(-OFFSET_PX, OFFSET_PX, count) if count > 1 else torch.zeros(1)
         true = (self.column.to(self.shading)[:, None] + offsets).reshape(-1)
+        # A whole column is off by as much the other way on the other side of its middle.
+        true = true.round() + draw.sign * (true - true.round())
         moments = self.model.zero_moments(self.shading)[self.own]
         leds = torch.einsum("slj,srj->srl", moments, draw.nodes) * self.shading[:, None, None]
         zero = torch.einsum("nlf,nl->nf", self.direct.at(true), leds.flatten(0, 1))
@@ -308,14 +313,11 @@ class VirtualPixels:
             spread = spread + (self.direct_error * direct) ** 2
         return torch.where(draw.saturated | ~self.measured[:, None], 0.0, 1 / spread)
 
-    def _solve(
-        self, draw: Draw, noisy: Tensor, clean: Tensor, error_px: Tensor, spread: Tensor
-    ) -> tuple[Spectra, Spectra]:
-        """Spectra of all virtual pixels with noise, and without noise and error of the column."""
+    def _solve(self, draw: Draw, noisy: Tensor, error_px: Tensor, spread: Tensor) -> Spectra:
+        """Spectra of all virtual pixels."""
         single, weight = self.model.single, self._weights(draw, error_px)
         matrices: list[Tensor] = []
         rights: list[Tensor] = []
-        calm: list[Tensor] = []
         for s, first in enumerate(self.matrices.first):
             # The estimate traces all light from the column it believes in; next to the edge of a line of a
             # comb that moves the zero order by many times the first.
@@ -327,20 +329,17 @@ class VirtualPixels:
             strength = true.flatten(0, 1).abs().amax(1)
             # Frames without light still say what the black frames were off by.
             used = (strength > DARK * strength.max()) | (not single)
-            change = moved.flatten(1, 2)[:, used] * self.shading[s]
-            operator = true.flatten(0, 1)[used] * self.shading[s] + change
+            operator = (true.flatten(0, 1)[used] + moved.flatten(1, 2)[:, used]) * self.shading[s]
             w = weight[s].flatten(1)[:, used, None]
             operator = self._without_offset(draw, s, operator, w)
             rows = operator * w
             matrices.append(rows.mT @ operator)
-            shift = (change @ draw.nodes[s, :, :, None])[..., 0]
-            for out, data in ((rights, noisy[s]), (calm, clean[s])):
-                y = data.flatten(1)[:, used] + (0 if out is rights else shift)
-                out.append((rows.mT @ self._without_offset(draw, s, y[..., None], w))[..., 0])
-        matrix, right, quiet = (torch.cat(parts) for parts in (matrices, rights, calm))
+            y = self._without_offset(draw, s, noisy[s].flatten(1)[:, used, None], w)
+            rights.append((rows.mT @ y)[..., 0])
+        matrix, right = torch.cat(matrices), torch.cat(rights)
         if single:
-            matrix, right, quiet = self._with_colour(draw, matrix, right, quiet, spread)
-        return solve_dense(matrix, right, self.prior), solve_dense(matrix, quiet, self.prior)
+            matrix, right = self._with_colour(draw, matrix, right, spread)
+        return solve_dense(matrix, right, self.prior)
 
     def _without_offset(self, draw: Draw, sample: int, values: Tensor, weight: Tensor) -> Tensor:
         """Values (spectra, channels x frames, n) as far as the black frames' noise leaves them known."""
@@ -351,14 +350,14 @@ class VirtualPixels:
         return without_offset(values.reshape(apart), weight.reshape(apart), variance).flatten(1, 2)
 
     def _with_colour(
-        self, draw: Draw, matrix: Tensor, right: Tensor, quiet: Tensor, spread: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor]:
+        self, draw: Draw, matrix: Tensor, right: Tensor, spread: Tensor
+    ) -> tuple[Tensor, Tensor]:
         """Add the zero-order colour where a sample misses a band in both orders."""
         nm = self.bands.centroids_nm
         some = [self.model.reached(m, self.pixels, self.depth, nm[m][self.bands.reported]) for m in ORDERS]
         reached = torch.stack(some).any(0).all(0)
         if bool(reached.all()):
-            return matrix, right, quiet
+            return matrix, right
         colour = self._white(draw.nodes, (0,))
         variance = spread[..., None] ** 2 * self.factors[..., 0]
         root = ((~reached)[:, None, None] & self.measured).float() / (
@@ -368,9 +367,9 @@ class VirtualPixels:
         rows = (moments * (root * self.shading[:, None, None])[..., None]).flatten(0, 1)
         # Where the amplitude is unknown its equation weighs nothing, and neither does its noise.
         share = torch.where(torch.isfinite(variance), variance.sqrt() * root, 0.0)
-        clean, noise = colour * root, draw.normal(colour.shape) * share
-        add = [torch.einsum("ncj,nc->nj", rows, v.flatten(0, 1)) for v in (clean + noise, clean)]
-        return matrix + rows.mT @ rows, right + add[0], quiet + add[1]
+        y = colour * root + draw.normal(colour.shape) * share
+        right = right + torch.einsum("ncj,nc->nj", rows, y.flatten(0, 1))
+        return matrix + rows.mT @ rows, right
 
     def _shading_error(self, draw: Draw, column: Column, depth_error: Tensor) -> Tensor:
         """Relative errors of shading from noise in depth, (samples, spectra)."""
@@ -390,11 +389,12 @@ class VirtualPixels:
         direct, first, black = (
             white.gather(2, own.expand(-1, white.shape[1], 1))[..., 0] for white in whites
         )
-        noise = self.code_bracket.variance(direct, black).sqrt()
+        noise = self.code_bracket.variance(direct + first, black).sqrt()
         to_edge = 0.5 - (column_px - column_px.round()).abs()
         darker = torch.special.ndtr(-to_edge / self.rig.projector_response.blur_px)
         unsure = ~torch.isfinite(self.code_bracket.variance(direct * darker + first / 2, black))
-        lit: Tensor = ((direct > LIT_SIGMAS * noise) | ~torch.isfinite(noise)) & (refined | ~unsure)
+        bright = (direct + first > LIT_SIGMAS * noise) | ~torch.isfinite(noise)
+        lit: Tensor = bright & (refined | ~unsure)
         return lit
 
     def _black(self, nodes: Tensor) -> Tensor:

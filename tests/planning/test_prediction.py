@@ -124,3 +124,22 @@ def test_black_that_saturates_is_a_plan_without_depth_and_no_crash() -> None:
         rig, plan(comb, Setting(exposure_ms=2000.0, level=0.4)), plane_samples(rig, grid=(2, 1)), peaks=False
     )
     assert found.coverage == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "least_rmse", "least_coverage"),
+    [
+        ({"projector_response": {"blur_px": 0.2}}, 0.003, 0.99),
+        ({"sensor": {"read_noise_dn": 20.0}}, 0.005, 0.78),
+    ],
+)
+def test_patch_means_have_what_noise_does_to_them_and_first_orders_help_to_decode(
+    changed: dict[str, dict[str, float]], least_rmse: float, least_coverage: float
+) -> None:
+    """Trials of these plans found 0.0055, and 0.0115 with a depth in 90 % of the picture."""
+    rig = published_rig()
+    parts = {part: getattr(rig, part).model_copy(update=values) for part, values in changed.items()}
+    rig = rig.model_copy(update={**parts, "camera": rig.camera.resized(112, 72)})
+    found = predict(rig, plan(ScanLines(step_px=4)), trial_samples(rig, references.chart()), peaks=False)
+    assert least_rmse < found.rmse < 0.012
+    assert found.coverage > least_coverage

@@ -39,7 +39,7 @@ class Steady(Draw):
 def steady(size: float) -> Draw:
     """A draw of nothing but noise of a size."""
     x = torch.zeros(1)
-    return Steady(x, x, x, x, x, x, x, x, x, x, torch.Generator(), size)
+    return Steady(x, x, x, x, x, x, x, x, x, x, torch.Generator(), 1, size)
 
 
 def virtual(rig: Rig, window_px: int) -> VirtualPixels:
