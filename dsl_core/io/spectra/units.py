@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -60,9 +60,13 @@ _COUNTER = re.compile(
     re.IGNORECASE,
 )
 #: Signs of uncertainties in certificates: "U (k=2)", "u(R)", "U_c", "±". A sample may be called "U (blue)".
-_UNCERTAINTY = re.compile(r"±|\+/-|\bk ?= ?[1-3]\b|^\W*[Uu](?: ?c| ?[\[(](?:95|%|[Rrρβ]\b|rho|reflect).*)$")
+_UNCERTAINTY = re.compile(
+    r"\W*(?:(?:±|\+/-).*|[Uu](?: ?c| ?[\[(]?(?:95|%|k ?=|[Rrρβ]\b|rho|reflect).*))", re.DOTALL
+)
 #: Titles of a column that are uncertainties behind one of these, and may be names of samples without.
 _SIGN, _OF_SIGN = re.compile(r"\W*[Uu]\W*"), re.compile(r"\W*(?:[RrTρβ]|rho)(?: ?\(.*\))?\W*")
+#: Beside a single spectrum, what is everywhere below this share of it is its uncertainty.
+SMALL = 0.2
 #: Where words of a title meet that are written together: "refl_std", "leafStd".
 _MEETING = re.compile(r"_|(?<=[a-z])(?=[A-Z])")
 
@@ -77,19 +81,28 @@ def is_beside(title: str) -> bool:
     """
     words = _MEETING.sub(" ", title)
     return bool(
-        _BESIDE.search(words) or _UNCERTAINTY.search(words) or (words.strip() and _COUNTER.fullmatch(words))
+        _BESIDE.search(words)
+        or _UNCERTAINTY.fullmatch(words)
+        or (words.strip() and _COUNTER.fullmatch(words))
     )
 
 
-def is_sign_beside(title: str, others: Iterable[str]) -> bool:
-    """Whether "U" is the uncertainty of one of the ``others`` rather than a sample of this name.
+def is_sign_beside(title: str, columns: Mapping[str, Floats]) -> bool:
+    """Whether "U" is the uncertainty of another one of the ``columns`` rather than a sample of this name.
 
-    >>> is_sign_beside("U", ["R"]), is_sign_beside("U", ["T1", "V"]), is_sign_beside("U", ["Reflectance"])
-    (True, False, True)
+    >>> r, u = np.full(9, 0.5), np.full(9, 0.005)
+    >>> is_sign_beside("U", {"R": r, "U": r}), is_sign_beside("U", {"T1": r, "V": r, "U": u})
+    (True, False)
+    >>> is_sign_beside("U", {"tile 7": r, "U": u}), is_sign_beside("U", {"S": r, "U": r})
+    (True, False)
     """
-    return bool(_SIGN.fullmatch(title)) and any(
-        _OF_SIGN.fullmatch(each) or _quantity(each, everywhere=True)[0] != "unstated" for each in others
-    )
+    others = {name: values for name, values in columns.items() if name != title}
+    if not _SIGN.fullmatch(title) or not others:
+        return False
+    if any(_OF_SIGN.fullmatch(name) or _quantity(name, everywhere=True)[0] != "unstated" for name in others):
+        return True
+    (first, *more) = others.values()
+    return not more and bool(np.nanmax(columns[title]) < SMALL * np.nanmedian(np.abs(first)))
 
 
 def counts_rows(title: str, values: Floats) -> bool:

@@ -34,6 +34,7 @@ def table(path: Path, titles: str, *columns: np.ndarray) -> Path:
         ("λ (nm),ρ(λ),U", ["ρ(λ)"]),
         ("nm,T,U", ["T"]),
         ("nm,S,U", ["S", "U"]),
+        ("nm,ref +/- 5,paint k=2", ["ref +/- 5", "paint k=2"]),
         ("nm,leaf,leafStd", ["leaf"]),
         ("nm,Channel,leaf", ["leaf"]),
         ("pixel number,nm,leaf", ["leaf"]),

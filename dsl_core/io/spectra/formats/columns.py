@@ -62,7 +62,7 @@ def spectra_of(path: Path, table: Table, known: Known | None = None) -> list[Spe
     _require_no_lines(path, titles, titles[first], given[kept])
     nm = to_nanometres(path, given[kept], titles[first], table.header)
     values_of = [i for i in columns if i != first and not is_beside(titles[i])]
-    shown = [titles[i] for i in values_of]
+    shown = {titles[i]: table.cells[:, i] for i in values_of}
     values_of = [i for i in values_of if not is_sign_beside(titles[i], shown)]
     spectra = []
     for i in values_of:
