@@ -84,7 +84,7 @@ class StereoOptions:
     base: Path | None
     camera_size: str | None
     projector: str | None
-    unit_mm: float
+    unit_mm: float | None
     from_projector: bool
     curves: tuple[Path | None, Path | None]
     force: bool

@@ -45,9 +45,9 @@ def import_(
         typer.Option("--camera-size", help="Image size of a calibration that does not contain it."),
     ] = None,
     unit_mm: Annotated[
-        float,
+        float | None,
         typer.Option("--unit-mm", min=1e-6, help="Unit of lengths of lenses and pose, mm: 1000 for metres."),
-    ] = 1.0,
+    ] = None,
     from_projector: Annotated[
         bool,
         typer.Option("--from-projector", help="The pose in a stereo file leads from projector to camera."),
@@ -106,7 +106,7 @@ def import_(
         "--led-curves": led_curves,
         "--from-projector": from_projector,
     }
-    of_lengths = {"--unit-mm": unit_mm != 1.0}
+    of_lengths = {"--unit-mm": unit_mm is not None}
     if source.is_file() and source.suffix.lower() in STEREO_FILES:
         _refuse(f"{source} is a stereo file", of_pictures, "a folder of pictures. Name that folder")
         curves = camera_curves, led_curves
@@ -136,7 +136,7 @@ def import_(
         if target is not None:
             sizes = {"--camera-size": camera_size, "--projector": projector}
             camera, light = (parse_size(name, size) if size else None for name, size in sizes.items())
-            imported, doubts = exchange.import_calibration(source, rig, camera, light, unit_mm)
+            imported, doubts = exchange.import_calibration(source, rig, camera, light, unit_mm or 1.0)
             for sentence in doubts:
                 output.say(f"Warning: {sentence}.")
             save_rig(imported, target, overwrite=force)

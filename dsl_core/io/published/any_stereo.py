@@ -64,10 +64,10 @@ def load_any_stereo(
     path: Path,
     camera_size_px: Size | None = None,
     projector_size_px: Size | None = None,
-    unit_mm: float = 1.0,
+    unit_mm: float | None = None,
     inverse: bool = False,
 ) -> FoundStereo:
-    """Read lenses and pose from any file that names them; lengths are in units of ``unit_mm``.
+    """Read lenses and pose from any file that names them; lengths are in units of ``unit_mm``, or as stated.
 
     A file that states its unit is read in that. Sizes (width, height) are those of the file where they are
     not given; with ``inverse`` its pose leads from projector to camera. Raises `CalibrationError` that says
@@ -136,8 +136,8 @@ def _require_pinhole(path: Path) -> None:
         )
 
 
-def _unit_mm(path: Path, given_mm: float) -> float:
-    """The unit of lengths that a file states, otherwise the given one; raises `CalibrationError`."""
+def _unit_mm(path: Path, given_mm: float | None) -> float:
+    """The unit of lengths that a file states, or the given one, or mm; raises `CalibrationError`."""
     texts = read_texts(path)
     stated = units_of(texts)
     said = ", ".join(f"{name} {texts[name]!r}" for name in stated)
@@ -146,8 +146,8 @@ def _unit_mm(path: Path, given_mm: float) -> float:
             f"{path} states the unit of its lengths by {said}; one of um, mm, cm, dm, m, in, ft is needed."
             " Correct the file, or remove that from it and give --unit-mm."
         )
-    unit_mm = next((each for each in stated.values() if each), given_mm)
-    if given_mm not in (1.0, unit_mm):
+    unit_mm = next((each for each in stated.values() if each), given_mm or 1.0)
+    if given_mm not in (None, unit_mm):
         raise CalibrationError(
             f"{path} states {said}, which is {unit_mm:g} mm, not {given_mm:g} mm as given. Give no other unit"
             " than the file, or correct that."

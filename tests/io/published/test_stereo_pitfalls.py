@@ -21,7 +21,7 @@ LENSES: dict[str, Any] = {"cam_K": K, "proj_K": P, "image_size": [1280, 1024], "
 PLAIN: dict[str, Any] = {**LENSES, "R": R.tolist(), "T": T.tolist()}
 
 
-def read(tmp_path: Path, parts: dict[str, Any], unit_mm: float = 1.0) -> FoundStereo:
+def read(tmp_path: Path, parts: dict[str, Any], unit_mm: float | None = None) -> FoundStereo:
     path = tmp_path / "c.json"
     path.write_text(json.dumps(parts, default=lambda each: each.tolist()), encoding="utf-8")
     return load_any_stereo(path, unit_mm=unit_mm)
@@ -80,7 +80,7 @@ def test_the_distance_of_a_camera_is_no_distortion(tmp_path: Path) -> None:
 def test_lengths_are_in_the_unit_that_a_file_states(
     tmp_path: Path, stated: dict[str, Any], unit_mm: float
 ) -> None:
-    for given_mm in {1.0, unit_mm}:
+    for given_mm in (None, unit_mm):
         found = read(tmp_path, {**PLAIN, "T": T / unit_mm, **stated}, given_mm)
         np.testing.assert_allclose(found.stereo.pose.vector_mm, T)
         assert f"its lengths are in units of {unit_mm:g} mm" in found.taken
@@ -94,9 +94,10 @@ def test_a_unit_that_is_none_or_two_is_refused(tmp_path: Path, stated: dict[str,
         read(tmp_path, {**PLAIN, **stated})
 
 
-def test_a_unit_that_is_given_against_the_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(CalibrationError, match="states unit 'cm', which is 10 mm, not 1000 mm as given"):
-        read(tmp_path, {**PLAIN, "unit": "cm"}, 1000.0)
+@pytest.mark.parametrize("given_mm", [1000.0, 1.0])
+def test_a_unit_that_is_given_against_the_file_is_refused(tmp_path: Path, given_mm: float) -> None:
+    with pytest.raises(CalibrationError, match=f"'cm', which is 10 mm, not {given_mm:g} mm as given"):
+        read(tmp_path, {**PLAIN, "unit": "cm"}, given_mm)
 
 
 @pytest.mark.parametrize("k1", [0.12, -0.12])
