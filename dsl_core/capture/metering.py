@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -191,10 +192,21 @@ class _Fit:
         """The setting with the least light."""
         return min(self.plan.settings, key=self.light)
 
-    def exposure_ms(self, wanted_ms: float) -> float:
-        """The longest exposure of whole cycles within this one, or the shortest that there is."""
+    @property
+    def in_cycles(self) -> bool:
+        """Whether exposures are whole cycles: a plan that exposes for less than one is for steady light."""
+        shortest_ms = min(setting.exposure_ms for setting in self.plan.settings)
+        return shortest_ms > (1 - 1e-6) * self.period_ms
+
+    def exposure_ms(self, wanted_ms: float, rounded: Callable[[float], int] = int) -> float:
+        """The longest exposure of whole cycles within this one, or the shortest that there is.
+
+        With ``rounded`` the number of cycles is rounded otherwise.
+        """
         low_ms, high_ms = self.range_ms
-        cycles = int(min(wanted_ms, high_ms) / self.period_ms + 1e-6)
+        if not self.in_cycles:
+            return min(max(wanted_ms, low_ms), high_ms)
+        cycles = min(rounded(wanted_ms / self.period_ms + 1e-6), int(high_ms / self.period_ms + 1e-6))
         return max(cycles, int(np.ceil(low_ms / self.period_ms - 1e-6)), 1) * self.period_ms
 
     def to(self, white: _White) -> Metered:
@@ -230,12 +242,16 @@ class _Fit:
         if made != self.plan:
             said += f": exposures are lengthened {self._words(made)}"
         if share * longer < DIM:
-            said += f", and white reaches {share * longer:.1%}. Open the aperture, or choose longer exposures"
+            said += f", and white reaches {share * longer:.1%}" if made != self.plan else ""
+            said += ". Open the aperture, or choose longer exposures"
         return Metered(made, f"{said}.", True)
 
     def _scaled(self, factor: float) -> CapturePlan:
+        # Others follow the darkest, so that their ratio to it stays, as far as whole cycles can.
+        darkest_ms = self.darkest.exposure_ms
+        factor = self.exposure_ms(darkest_ms * factor) / darkest_ms
         settings = tuple(
-            Setting(exposure_ms=self.exposure_ms(each.exposure_ms * factor), level=each.level)
+            Setting(exposure_ms=self.exposure_ms(each.exposure_ms * factor, round), level=each.level)
             for each in self.plan.settings
         )
         return self.plan.model_copy(update={"settings": settings})

@@ -310,3 +310,25 @@ def test_faint_light_says_nothing_of_its_level() -> None:
 
 def test_numbers_in_the_first_row_are_told_before_the_scan() -> None:
     assert "first row of black holds numbers" in doubt_of(Bench(light_for(0.5, 200.0, 0.5), numbers=20))
+
+
+@pytest.mark.parametrize("range_ms", [(0.05, 500.0), (0.05, 8.0)])
+def test_exposures_below_a_cycle_are_shortened_within_the_range_of_the_camera(
+    range_ms: tuple[float, float],
+) -> None:
+    """Whole cycles would make them longer, and longer than the camera can."""
+    bench = Bench(light_for(2.2, 4.0), range_ms=range_ms)
+    found = meter(rig_of(bench), plan_of((4.0, 1.0)))
+    assert exposures(found) == [pytest.approx(2.0, rel=0.01)]
+    assert "exposures are shortened from 4 to 2.001 ms." in found.sentence
+
+
+def test_a_bracket_that_is_shortened_to_few_cycles_stays_one() -> None:
+    found = meter(rig_of(Bench(light_for(4.0, 30.0))), plan_of((30.0, 1.0), (50.0, 1.0)))
+    assert exposures(found) == [10.0, 20.0]
+
+
+def test_a_dark_scene_whose_exposure_is_the_longest_is_told_so_once() -> None:
+    found = meter(rig_of(Bench(light_for(0.01, 10.0), range_ms=(1.0, 12.0))), plan_of((10.0, 1.0)))
+    assert exposures(found) == [10.0]
+    assert found.sentence.endswith("in the brightest setting. Open the aperture, or choose longer exposures.")
