@@ -235,9 +235,10 @@ class _Camera(_Guard, Camera):
         )
         _require_same(self._name, self._info, info)
         require_frame(frame, info, self._exposure_ms)
-        self._require_whole(frame.pixels)
-        # A driver may fill the same memory again with its next picture.
-        return replace(frame, pixels=frame.pixels.copy(), frame_id=int(frame.frame_id))
+        # A driver may fill the same memory again with its next picture, and may have masked pixels of it.
+        pixels = np.array(frame.pixels)
+        self._require_whole(pixels)
+        return replace(frame, pixels=pixels, frame_id=int(frame.frame_id))
 
     def _require_whole(self, pixels: NDArray[np.uint16]) -> None:
         """Raise `DeviceError` for rows that are missing: not for dark ones of a camera without black level.

@@ -46,8 +46,11 @@ def require_frame(frame: object, camera: CameraInfo, exposure_ms: float | None) 
         "number": frame.frame_id,
     }
     for what, value in said.items():
-        if not isinstance(value, Real):
-            raise DeviceError(f"{name} says that the {what} of a frame is {value!r}. Update its driver.")
+        # A frame without a time says nan; a number that is none, or that no clock reaches, is a fault.
+        if not isinstance(value, Real) or not _is_float(value) or (what == "number" and value != value // 1):
+            raise DeviceError(
+                f"{name} says that the {what} of a frame is {repr(value)[:40]}. Update its driver."
+            )
     require_mosaic(frame.pixels, (camera.width_px, camera.height_px), name)
     brightest, most = int(frame.pixels.max()), 2**camera.bit_depth - 1
     if brightest > most:
@@ -59,6 +62,14 @@ def require_frame(frame: object, camera: CameraInfo, exposure_ms: float | None) 
         raise DeviceError(f"{name} says that it exposed for {frame.exposure_ms:g} ms. Update its driver.")
     if exposure_ms is not None:
         require_exposure(frame.exposure_ms, exposure_ms, name)
+
+
+def _is_float(value: Real) -> bool:
+    try:
+        float(value)
+    except OverflowError:
+        return False
+    return True
 
 
 def require_whole(pixels: NDArray[np.uint16], name: str) -> None:

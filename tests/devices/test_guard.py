@@ -269,6 +269,9 @@ def test_opening_passes_errors_on_and_is_bounded_too() -> None:
         (replace(FRAME, exposure_ms=5.0), "exposes for 5 ms instead of 10 ms"),
         (replace(FRAME, exposure_ms=float("nan")), "exposed for nan ms"),
         (replace(FRAME, frame_id=None), "the number of a frame is None"),  # type: ignore[arg-type]
+        (replace(FRAME, frame_id=float("nan")), "the number of a frame is nan"),  # type: ignore[arg-type]
+        (replace(FRAME, frame_id=float("inf")), "the number of a frame is inf"),  # type: ignore[arg-type]
+        (replace(FRAME, timestamp_s=10**400), r"the time of a frame is 1000\d*. Update its driver"),
     ],
 )
 def test_frames_that_cannot_be_are_refused(frame: Any, sentence: str, lab: _Lab, rig: DeviceRig) -> None:
@@ -276,6 +279,13 @@ def test_frames_that_cannot_be_are_refused(frame: Any, sentence: str, lab: _Lab,
     lab.act["snap"] = lambda: frame
     with pytest.raises(DeviceError, match=sentence):
         rig.camera.snap()
+
+
+def test_pixels_that_a_driver_masks_are_pixels(lab: _Lab, rig: DeviceRig) -> None:
+    rig.camera.configure(10.0)
+    pixels = np.ma.masked_array(np.full((4, 6), 9, np.uint16), np.eye(4, 6, dtype=bool))
+    lab.act["snap"] = lambda: replace(FRAME, pixels=pixels)
+    assert type(rig.camera.snap().pixels) is np.ndarray
 
 
 def test_rows_without_any_count_are_dark_where_a_black_picture_had_none_either(
