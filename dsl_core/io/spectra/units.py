@@ -11,13 +11,24 @@ import numpy as np
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.records import Floats, Quantity
 
-_PREFIXES = {"": 1.0, "n": 1e-9, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "u": 1e-6, "k": 1e3}
+_PREFIXES = (
+    {"": 1.0, "p": 1e-12, "n": 1e-9, "m": 1e-3, "k": 1e3, "M": 1e6}
+    | dict.fromkeys(("µ", "μ", "u", "micro"), 1e-6)
+    | {"milli": 1e-3, "nano": 1e-9}
+)
 #: Power, then area and steradian somewhere behind it: "mW/m^2/sr/nm", "W·sr⁻¹·m⁻²·nm⁻¹", "W/(sr sqm nm)".
-_POWER = re.compile(r"(?<![a-zA-Zµμ])([nmµμuk]?)(?:W|Watts?)(?![a-zA-Z])([^\n]{0,40})")
+_POWER = re.compile(r"(?<![a-zA-Zµμ])(nano|micro|milli|[pnmµμukM]?)(?:W|[Ww]atts?)(?![a-zA-Z])([^\n]{0,40})")
+#: "m^2", "cm**2", "cm^{-2}", "sq cm", of an area in the unit that stands for ``{}``.
+_AREA = r"(?<![a-zA-Z]){0}\s?(?:\^?\{{?[-−]?2\}}?|\*\*[-−]?2|²|⁻²)|sq ?{0}"
+_SQUARE_CM, _SQUARE_MM = re.compile(_AREA.format("cm")), re.compile(_AREA.format("mm"))
 _TEN = re.compile(r"(?:10\s?\^\s?\(?|10[eE]|1[eE])([-+−]?\d{1,2})\)?[ ·*×]{0,3}$")
-_MICROMETRE = re.compile(r"(?<![a-zA-Z])(?:um|µm|μm|micromet(?:er|re)s?|microns?)(?![a-zA-Z])", re.IGNORECASE)
+_MICROMETRE = re.compile(
+    r"(?<![a-zA-Z])(?:um|µm|μm|\\mu\s?m|micromet(?:er|re)s?|microns?)(?![a-zA-Z])", re.IGNORECASE
+)
 _NANOMETRE = re.compile(r"(?<![a-zA-Z])(?:nm|nanomet(?:er|re)s?)(?![a-zA-Z])", re.IGNORECASE)
-_ANGSTROM = re.compile(r"(?<![a-zA-Z])(?:Å|angstr(?:o|ö)ms?)(?![a-zA-Z])|[(\[]A[)\]]", re.IGNORECASE)
+_ANGSTROM = re.compile(r"(?<![a-zA-Z])(?:Å|angstr(?:o|ö)ms?)(?![a-zA-Z])", re.IGNORECASE)
+#: The same in the title of the axis: "(A)" over another column names a sample.
+_ANGSTROM_AXIS = re.compile(r"[(\[]A[)\]]")
 _WAVENUMBER = re.compile(r"wave ?number|cm\s?(?:\^?-1|⁻¹)|1/cm", re.IGNORECASE)
 #: What axes of spectra may count instead of wavelength, with the name of each.
 _OTHER_AXES = (
@@ -27,22 +38,30 @@ _OTHER_AXES = (
 )
 #: Percent as a unit: "99 % reflectance" names a white standard, "0-100 %" the values.
 _PERCENT = re.compile(
-    r"(?:(?<!\d)(?<!\d )|(?<![\d.])0 ?(?:-|–|\.\.+|…|to) ?100 ?)(?:%|percent)", re.IGNORECASE
+    r"(?:(?<!\d)(?<!\d )|(?<![\d.])0 ?(?:-|–|\.\.+|…|to) ?100 ?)"
+    r"(?:%|per ?cent|(?<![a-z])(?:pct|prozent|v\. ?h\.)(?![a-z]))|[\[(]0 ?(?:-|–|…|to) ?100[\])]",
+    re.IGNORECASE,
 )
 #: The unit of spectrometers, which only a title has behind the number of a sample: "leaf 12 %R". A tile of
-#: "12 % reflectance" has that, with a space, as its name.
-_PERCENT_R = re.compile(r"%(?: ?[RT]\b|refl|trans)", re.IGNORECASE)
+#: "12 % reflectance" or "20%reflectance" has that as its name.
+_PERCENT_R = re.compile(r"(?<!\d)%(?: ?[RT]\b|refl|trans)", re.IGNORECASE)
 _UNIT_LINE = re.compile(r"\W*(?:y[- ]?)?units?\b", re.IGNORECASE)
 #: In the order in which they are tried; a unit of power decides before all of them.
 _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
     ("irradiance", re.compile(r"irrad|\birr\b", re.IGNORECASE)),
-    ("absorbance", re.compile(r"absorb|log ?\(1/R\)|kubelka|K/S\b", re.IGNORECASE)),
+    ("absorbance", re.compile(r"absorban[cz]|log ?\(1/R\)|kubelka", re.IGNORECASE)),
     ("transmittance", re.compile(r"transmi", re.IGNORECASE)),
     ("reflectance", re.compile(r"reflect|reflekt|remission|albedo", re.IGNORECASE)),
-    # Of reflectance, absorption may be said in passing; short forms may be names of samples, such as of ABS.
+    # Of reflectance, absorption may be said in passing, and samples are called "ABS" or "absorptive black":
+    # these words say what is measured where they are all of a line but its label and unit.
     (
         "absorbance",
-        re.compile(r"(?i:absorp|extin[ck]t|optical dens|optische dichte)|^\W*(?:Abs|OD)\b[^\w]*$"),
+        re.compile(
+            r"^\W*(?:(?:y\W?)?(?:axis|units?|label|quantity|mode|type)\W+)?"
+            r"(?:Abs|OD|K/S|(?i:absorptions?|extin[ck]tion|optical density|optische dichte)"
+            r"(?i: ?(?:coefficient|spectrum|a\.?u\.?))?)(?: ?[\[(][^\])\n]*[\])])?\W*$",
+            re.MULTILINE,
+        ),
     ),
     ("counts", re.compile(r"\bcounts?\b|\bDN\b|\bscope\b|digital number", re.IGNORECASE)),
     ("radiance", re.compile(r"radiance|strahldichte|\brad\b", re.IGNORECASE)),
@@ -50,19 +69,23 @@ _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
 #: Words for columns that hold no spectrum of their own, wherever they stand in a title.
 _BESIDE = re.compile(
     r"deviation|abweichung|uncertain|unsicherheit|variance|(?<!\()λ|wave ?(?:len|num)|wvl|wellenl"
-    r"|\b(?:std ?(?:dev)?|st\. ?dev|errors?|sd|sem|flags?|wave|lambda|snr|fwhm|band ?widths?)\b",
+    r"|\b(?:std ?(?:dev)?|st\.? ?dev|errors?|incertitude|sd|sem|flags?|wave|lambda)\b",
     re.IGNORECASE,
 )
 #: Words that say so where they are all of the title: "pixel 3" and "No. 2 blue" are spectra.
 _COUNTER = re.compile(
-    r"\W*(?:pixels?|chan(?:nels?)?|index|n[or]|id|row|zeile|#|cv|quality|detector)?"
-    r"(?: ?(?:n[or]|number|index))?(?:(?<=\w) ?[\[(](?:%|nm|1|-)[\])])?\W*",
+    r"\W*(?:pixels?|chan(?:nels?)?|index|n[or]|id|row|zeile|#|cv|quality|detector|snr|fwhm|band ?widths?)?"
+    r"(?: ?(?:n[or]|number|index))?(?:(?<=\w) ?[\[(](?:%|nm|1|-|d ?B)[\])])?\W*",
     re.IGNORECASE,
 )
 #: Signs of uncertainties in certificates: "U (k=2)", "u(R)", "U_c", "±". A sample may be called "U (blue)".
 _UNCERTAINTY = re.compile(
-    r"\W*(?:(?:±|\+/-).*|[Uu](?: ?c| ?[\[(]?(?:95|%|k ?=|[Rrρβ]\b|rho|reflect).*))", re.DOTALL
+    r"\W*(?:(?:±|\+/-).*|(?i:(?:expanded )?unc|err)\.?|[0-9]?(?:σ|sigma|sd)|[ΔδdD]R|CI ?\d*"
+    r"|[Uu](?: ?c(?: ?\(.*)?| ?[\[(]?(?:95|%|k ?=|[Rrρβ]\b|rho|reflect).*))\W*",
+    re.DOTALL,
 )
+#: Titles that are those of uncertainties where their values are small, and may be names of samples otherwise.
+_SHORT = re.compile(r"\W*(?:s|se|rms|tolerance|precision)\W*", re.IGNORECASE)
 #: Titles of a column that are uncertainties behind one of these, and may be names of samples without.
 _SIGN, _OF_SIGN = re.compile(r"\W*[Uu]\W*"), re.compile(r"\W*(?:[RrTρβ]|rho)(?: ?\(.*\))?\W*")
 #: Beside a single spectrum, what is everywhere below this share of it is its uncertainty.
@@ -97,7 +120,12 @@ def is_sign_beside(title: str, columns: Mapping[str, Floats]) -> bool:
     (True, False)
     """
     others = {name: values for name, values in columns.items() if name != title}
-    if not _SIGN.fullmatch(title) or not others:
+    if not others:
+        return False
+    if _SHORT.fullmatch(title):
+        least = min(float(np.nanmedian(np.abs(values))) for values in others.values())
+        return bool(np.nanmax(columns[title]) < SMALL * least)
+    if not _SIGN.fullmatch(title):
         return False
     if any(_OF_SIGN.fullmatch(name) or _quantity(name, everywhere=True)[0] != "unstated" for name in others):
         return True
@@ -170,12 +198,13 @@ def _quantity(text: str, everywhere: bool) -> tuple[Quantity, float, bool]:
 
 def _to_radiance(before: str, prefix: str, behind: str) -> float:
     factor = _PREFIXES[prefix]
-    if re.search(r"(?<![a-z])(?:cm\s?(?:\^?-?2|²|⁻²)|sq ?cm)", behind):
-        factor *= 1e4
+    factor *= 1e4 if _SQUARE_CM.search(behind) else 1e6 if _SQUARE_MM.search(behind) else 1.0
     if re.search(r"(?<![a-zA-Zµμn])m\s?(?:\^?-?3|³|⁻³)", behind):
         factor *= 1e-9
     elif _MICROMETRE.search(behind):
         factor *= 1e-3
+    elif _ANGSTROM.search(behind):
+        factor *= 10.0
     ten = _TEN.search(before)
     return factor * 10.0 ** int(ten[1].replace("−", "-")) if ten else factor
 
@@ -190,7 +219,7 @@ def to_nanometres(path: Path, given: Floats, title: str, around: str = "") -> Fl
                 " spectrum over wavelength."
             )
     words = title if _NANOMETRE.search(title) or _MICROMETRE.search(title) else f"{title}\n{_spoken(around)}"
-    if _ANGSTROM.search(words) and most > 1500:
+    if (_ANGSTROM.search(words) or _ANGSTROM_AXIS.search(title)) and most > 1500:
         return given / 10.0
     in_nm, in_um = bool(_NANOMETRE.search(words)), bool(_MICROMETRE.search(words))
     is_small = most < 50

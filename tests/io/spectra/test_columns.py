@@ -10,6 +10,7 @@ import pytest
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.formats.columns import read_columns
 from dsl_core.io.spectra.reference_file import read_references
+from dsl_core.io.spectra.units import quantity_of
 
 NM = np.arange(400, 701, 10)
 LEAF = 0.2 + 0.1 * np.sin(NM / 50)
@@ -35,6 +36,15 @@ def table(path: Path, titles: str, *columns: np.ndarray) -> Path:
         ("nm,T,U", ["T"]),
         ("nm,S,U", ["S", "U"]),
         ("nm,ref +/- 5,paint k=2", ["ref +/- 5", "paint k=2"]),
+        ("nm,Reflectance,StDev", ["Reflectance"]),
+        ("nm,R,2σ,Unc.,ΔR,uc(R)", ["R"]),
+        ("nm,leaf SNR 40,bandwidth 5 nm", ["leaf SNR 40", "bandwidth 5 nm"]),
+        ("nm,leaf,SNR (dB),FWHM (nm)", ["leaf"]),
+        (
+            "nm,absorptive black,K/S paper,optical density filter",
+            ["absorptive black", "K/S paper", "optical density filter"],
+        ),
+        ("nm,Leaf (A),s", ["Leaf (A)", "s"]),
         ("nm,leaf,leafStd", ["leaf"]),
         ("nm,Channel,leaf", ["leaf"]),
         ("pixel number,nm,leaf", ["leaf"]),
@@ -272,3 +282,60 @@ def test_absorption_is_no_reflectance(tmp_path: Path, title: str) -> None:
 def test_words_like_absorption_do_not_refuse_reflectance(tmp_path: Path, title: str) -> None:
     path = table(tmp_path / "a.csv", f"nm,{title}", NM, LEAF)
     np.testing.assert_allclose(read_references(path).references[0].curve.values, LEAF, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("title", "left_out"), [("s", True), ("tolerance", True), ("U", True), ("S", True)])
+def test_a_short_title_is_an_uncertainty_where_its_values_are_small(
+    title: str, left_out: bool, tmp_path: Path
+) -> None:
+    for values, is_out in ((LEAF / 100, left_out), (LEAF, False)):
+        path = table(tmp_path / "some.csv", f"nm,tile 7,{title}", NM, LEAF, values)
+        assert [each.name for each in read_columns(path)] == ["tile 7", title][: 2 - is_out]
+
+
+@pytest.mark.parametrize(
+    "said",
+    ["# water absorption bands removed", "Comment: absorption corrected", "Title: extinction corrected leaf"],
+)
+def test_absorption_in_passing_leaves_reflectance_what_it_is(said: str, tmp_path: Path) -> None:
+    path = table(tmp_path / "some.csv", f"{said}\nwavelength,value", NM, LEAF)
+    assert read_columns(path)[0].quantity == "unstated"
+    assert len(read_references(path).references) == 1
+
+
+@pytest.mark.parametrize(
+    "title", ["20%reflectance tile", "50%refl", "99 % reflectance", "reflectance 50 pct tile"]
+)
+def test_percent_in_the_name_of_a_tile_is_no_unit(title: str) -> None:
+    assert quantity_of(title)[1] == 1.0
+
+
+@pytest.mark.parametrize(
+    "title", ["Reflectance_pct", "Reflexionsgrad in Prozent", "Remission (v.H.)", "R (0-100)", "leaf 12 %R"]
+)
+def test_percent_in_words_is_a_unit(title: str) -> None:
+    assert quantity_of(title)[1:] == (0.01, True)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [
+        ("uW cm^{-2} sr^{-1} nm^{-1}", 1e-2),
+        ("microW/(cm2 sr nm)", 1e-2),
+        ("W/sr/cm**2/nm", 1e4),
+        ("mW/(mm² sr nm)", 1e3),
+        ("W/(m² sr Å)", 10.0),
+        ("W m^{-2} sr^{-1} \\mu m^{-1}", 1e-3),
+        ("MW/(sr m2 nm)", 1e6),
+    ],
+)
+def test_units_of_radiance_are_read_as_others_write_them(unit: str, factor: float) -> None:
+    quantity, found, is_stated = quantity_of(f"Radiance ({unit})")
+    assert (quantity, is_stated) == ("radiance", True)
+    assert found == pytest.approx(factor)
+
+
+def test_a_letter_over_another_column_is_no_unit_of_wavelengths(tmp_path: Path) -> None:
+    nm = np.linspace(350, 2500, 44)
+    path = table(tmp_path / "some.csv", "Wavelength,Leaf (A),Leaf (B)", nm, nm / 5000, nm / 6000)
+    assert read_columns(path)[0].nm[-1] == 2500
