@@ -7,6 +7,7 @@ numbers is a vector of Rodrigues. Whatever a file does not say itself is told, f
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,6 +101,7 @@ def load_any_stereo(
             " that neither leads from one to the other. Give one R and T from camera to projector instead:"
             " for poses x = R X + t of points X of the world, R = Rp Rc^T and T = tp - R tc."
         )
+    _require_distortions(path, numbers, nodes.keys() - numbers.keys())
     for part in ("camera matrix", "projector matrix"):
         require_lens_matrix(parts.values[part], parts.names[part], path)
     unit_mm = _unit_mm(path, unit_mm)
@@ -167,6 +169,18 @@ def _size(path: Path, numbers: Numbers, device: str, given: Size | None) -> Size
             f" {_CORRECT[device]}"
         )
     return size
+
+
+def _require_distortions(path: Path, numbers: Numbers, others: Collection[str]) -> None:
+    """Raise `CalibrationError` if one of ``others``, which are no numbers, is named as a distortion."""
+    # "K" may be that of a matrix as well.
+    for name in sorted(each for each in others if re.search("dist|kc", each, re.IGNORECASE)):
+        found = parts_of({**numbers, name: np.zeros(5)}).names
+        if any(found.get(part) == name for part in _PARTS if part.endswith("distortion")):
+            raise CalibrationError(
+                f"{path}: {name} is named as a distortion, but is not all finite numbers. Write k1 k2 p1"
+                " p2 k3, or remove it if the lens has no distortion."
+            )
 
 
 def _distortion(parts: Parts, who: str, path: Path) -> NDArray[np.float64]:

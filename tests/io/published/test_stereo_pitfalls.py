@@ -187,3 +187,16 @@ def test_another_model_of_lenses_is_found_in_any_encoding(tmp_path: Path) -> Non
     (tmp_path / "c.json").write_text('{"model": "fisheye"}', encoding="utf-16")
     with pytest.raises(CalibrationError, match="describes a lens by the model 'fisheye'"):
         load_any_stereo(tmp_path / "c.json")
+
+
+@pytest.mark.parametrize(
+    "given", [[-0.1, float("nan"), 0, 0, 0], [-0.1, None, 0, 0, 0], "-0.1, 0.02, 0, 0, 0"]
+)
+def test_a_distortion_that_cannot_be_read_is_not_left_out(tmp_path: Path, given: Any) -> None:
+    with pytest.raises(CalibrationError, match="cam_dist is named as a distortion, but is not all finite"):
+        read(tmp_path, {**PLAIN, "cam_dist": given})
+
+
+def test_words_about_a_distortion_are_none(tmp_path: Path) -> None:
+    said = {"distortion_model": "plumb_bob", "note": "dist measured", "cam_date": None}
+    assert read(tmp_path, {**PLAIN, **said}).stereo.camera.distortion == (0,) * 5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from pathlib import Path
 
@@ -170,6 +171,9 @@ def test_several_spectra_are_listed_by_name(tmp_path: Path) -> None:
     path = write(tmp_path / "a.cgats", made.cgats("REFLECTIVE", "100.0"))
     assert [each.name for each in read_references(path).references] == ["patch 1", "patch 2"]
     np.testing.assert_allclose(read_reference(path, "patch 2").values, SHARE / 5, atol=1e-6)
+    decimals = re.sub(r"(?<=\d)\.(?=\d)", ",", made.cgats("REFLECTIVE", "100"))
+    of_commas = read_reference(write(tmp_path / "commas.cgats", decimals), "patch 2")
+    np.testing.assert_allclose(of_commas.values, SHARE / 5, atol=1e-6)
     with pytest.raises(CalibrationError, match=r"2 spectra \('patch 1', 'patch 2'\)"):
         read_spectrum(path, COVERS, radiance=False)
     assert len(read_radiances(write(tmp_path / "b.csv", made.konica_minolta()), COVERS)) == 2

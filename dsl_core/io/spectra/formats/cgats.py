@@ -80,7 +80,8 @@ def _rows(path: Path, known: dict[str, str], fields: list[str], data: list[str])
     name_at = next((fields.index(name) for name in _NAMES if name in fields), None)
     spectra = []
     for row in range(0, len(data), len(fields)):
-        values = np.array([number_of(data[row + i]) for i in columns])
+        # Programs of some languages write "0,2".
+        values = np.array([number_of(data[row + i].replace(",", ".")) for i in columns])
         rising_nm, values = rising(path, nm, values)
         name = data[row + name_at] if name_at is not None else ""
         is_scaled = quantity != "unstated" and "SPECTRAL_NORM" in known
