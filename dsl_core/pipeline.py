@@ -30,6 +30,7 @@ from dsl_core.evaluation import summary
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.evaluation.report.scan_report import ReportContent, render_report
 from dsl_core.evaluation.summary import Evaluation, Truth
+from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.proof_file import read_proof, save_proof
 from dsl_core.io.staging import write_text
@@ -86,11 +87,12 @@ def open_scan(
     with ScanWriter.open(folder, plan, rig, {**(notes or {}), **expected}) as writer:
         stored = ScanReader(folder)
         watches = ScanWatches.of(rig, plan, prove, metering.WHITE_MEASURED in stored.manifest.notes)
-        watches.learn(writer, stored)
+        exposed = as_exposed(stored)
+        watches.learn(writer, exposed)
         sink = watches.over(WatchedSink(writer, watch) if watch else writer)
         known = stored.calibration
         runner = Runner(
-            rig, plan, sink, pattern_image, progress=progress, token=token, stored=stored, waits=waits,
+            rig, plan, sink, pattern_image, progress=progress, token=token, stored=exposed, waits=waits,
             proof=watches.proof, sentinels=watches.sentinels, exposure=watches.exposure,
             is_proven=known is not None and read_proof(stored, known) is not None, again=again,
         )  # fmt: skip
@@ -107,9 +109,12 @@ def _keep_proof(reader: ScanReader, seen: SeenFrames, past: tuple[str, ...] = ()
     """
     if reader.calibration is None or read_proof(reader, reader.calibration) is not None:
         return
-    seen.read_missing(reader)
-    sensor = reader.calibration.sensor
-    found = prove_frames(reader, seen, reader.calibration, sensor.bit_depth, sensor.bayer)
+    exposed, sensor = as_exposed(reader), reader.calibration.sensor
+    if exposed is not reader and seen.unseen:
+        # What was kept while scanning may have the light of another exposure.
+        seen = SeenFrames(exposed.plan)
+    seen.read_missing(exposed)
+    found = prove_frames(exposed, seen, reader.calibration, sensor.bit_depth, sensor.bayer)
     if past:
         found = found.model_copy(update={"wrong": (*found.wrong, *past)})
     try:

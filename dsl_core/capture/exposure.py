@@ -18,6 +18,7 @@ from dsl_core.devices.plausible import require_exposure, require_mosaic
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
+from dsl_core.optics.sensor import as_if_exposed
 from dsl_core.progress import CancelToken
 from dsl_core.words import ended
 
@@ -66,7 +67,13 @@ class ShotTaker:
         self._shown: tuple[object, ...] | None = None
         self._exposure_ms: float | None = None
         self._last: Frame | None = None
+        #: Exposures in force by those planned, ms, which a camera may have rounded.
+        self._in_force_ms: dict[float, float] = {}
         self._noiseless = False
+
+    def assume(self, stored: Shot) -> None:
+        """Compare frames with those of earlier runs, whose ``stored`` shots have the exposure in force."""
+        self._in_force_ms[self._plan.settings[stored.setting].exposure_ms] = stored.exposure_ms
 
     def take(self, shot: Shot, earlier_rounds: int = 0, settle_ms: float = 0.0, twice: bool = False) -> Frame:
         """The frame of a shot; raises `DeviceError` when all attempts failed, or `Cancelled`.
@@ -124,9 +131,18 @@ class ShotTaker:
         frame = self._rig.camera.snap(timeout_ms)
         require_mosaic(frame.pixels, self._plan.camera_size_px, "The camera")
         require_exposure(frame.exposure_ms, shot.exposure_ms, "The camera")
-        frame = replace(self._order.take(frame), shown_s=self._shown_s)
+        frame = replace(self._order.take(frame), shown_s=self._shown_s, even=self._even(shot, frame))
         self._last = frame
         return frame
+
+    def _even(self, shot: Shot, frame: Frame) -> NDArray[np.uint16] | None:
+        """The mosaic as if exposed as the first of its setting; None where it was, or black is not known."""
+        usual_ms = self._in_force_ms.setdefault(shot.exposure_ms, frame.exposure_ms)
+        known = self._rig.calibration
+        if known is None:
+            return None
+        even = as_if_exposed(frame.pixels, usual_ms / frame.exposure_ms, known.sensor)
+        return None if even is frame.pixels else even
 
     def _set(self, shot: Shot, send: bool = False) -> None:
         """Send pattern and exposure where they differ from what the devices have, or the pattern anyway."""

@@ -14,7 +14,7 @@ from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import Shot
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.seen_noise import usual_sensor
-from dsl_core.optics.sensor import raw_variance
+from dsl_core.optics.sensor import as_if_exposed, raw_variance
 
 #: Pixels are averaged over blocks of this many rows and columns, so that noise does not pass for movement.
 BLOCK_PX = 8
@@ -89,6 +89,7 @@ def check_movement(
 ) -> MovementReport:
     """Take ``shots`` again and compare them with the stored ones; nothing is stored.
 
+    The ``source`` has the exposures in force, ``shots`` those planned. A calibrated rig may expose otherwise.
     Stored shots that are ``dark`` show what a camera that is not calibrated sees without the projector's
     light, which grows with the exposure: those of a setting serve its own shots.
 
@@ -112,13 +113,17 @@ def check_movement(
     def light(shot: Shot, pixels: NDArray[np.uint16]) -> NDArray[np.float64]:
         return np.asarray(_blocks(pixels) - black.get(shot.setting, unknown))
 
+    def new_light(shot: Shot) -> NDArray[np.float64]:
+        frame = taker.take(shot)
+        share = source.plan.settings[shot.setting].exposure_ms / frame.exposure_ms
+        return light(shot, as_if_exposed(frame.pixels, share, known) if known else frame.pixels)
+
     try:
-        pairs = [(light(shot, source.read(shot)), light(shot, taker.take(shot).pixels)) for shot in chosen]
+        pairs = [(light(shot, source.read(shot)), new_light(shot)) for shot in chosen]
     finally:
         taker.show_black()
-    old_light = sum(float(old.sum()) for old, _ in pairs)
-    new_light = sum(float(new.sum()) for _, new in pairs)
-    ratio = new_light / old_light if old_light > 0 else float("inf")
+    before, now = (sum(float(each.sum()) for each in every) for every in zip(*pairs, strict=True))
+    ratio = now / before if before > 0 else float("inf")
     change = max(_change(*pair, ratio, sensor) for pair in pairs) if np.isfinite(ratio) else float("inf")
     return MovementReport(tuple(shot.index for shot in chosen), ratio, change)
 

@@ -119,10 +119,15 @@ class Runner:
         diagnosis = Diagnosis(plan, SensorWatch(plan, sensor, camera.bit_depth, camera.bayer))
         self._shots = ProvenShots(self._taker, proof, diagnosis, sink, self._token, rig.only_repeats, again)
         self._stored = stored
+        if stored is not None:
+            missing = {shot.index for shot in sink.missing()}
+            for shot in stored.plan.shots():
+                if shot.index not in missing:
+                    self._taker.assume(shot)
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)
         self._exposure, self._waits, self._is_proven = exposure, waits, is_proven
-        self._place = PutBack(plan, sentinels, lambda shot: self._taker.take(shot).pixels, sink)
+        self._place = PutBack(plan, sentinels, lambda shot: self._taker.take(shot).seen, sink)
         self._status = Status(State.IDLE, total=plan.shot_count)
         self._listeners: list[Listener] = []
         self._condition = threading.Condition()
@@ -173,7 +178,7 @@ class Runner:
             self._status = replace(self._status, done=earlier, earlier=earlier)
             is_proven = self._is_proven and not missing
             if self._stored is not None:
-                self._shots.learn(self._stored, {shot.index for shot in missing})
+                self._shots.learn(self._stored, self._plan, {shot.index for shot in missing})
             self._take_all(missing)
             # Later pictures may have cast doubt on earlier ones.
             self._take_all(list(self._sink.missing()))

@@ -58,4 +58,4 @@ class ScanWatches:
 
 
 def _pixels_to(look: Callable[[Shot, NDArray[np.uint16]], None]) -> Watch:
-    return lambda shot, frame: look(shot, frame.pixels)
+    return lambda shot, frame: look(shot, frame.seen)

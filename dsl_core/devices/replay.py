@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame, FrameSource
-from dsl_core.model.plan import Setting, Shot
+from dsl_core.model.plan import Shot
 from dsl_core.model.rig import BayerPattern, Rig
 
 #: What the rig is called in scans of it.
@@ -25,20 +23,20 @@ class ReplayCamera(Camera):
         source: FrameSource,
         bayer: BayerPattern = "RGGB",
         bit_depth: int = 12,
-        in_force: Sequence[Setting] = (),
+        exposed: FrameSource | None = None,
     ) -> None:
         """Play back ``source``; it stays open and belongs to the caller.
 
-        ``in_force`` are the settings of its plan as its camera exposed them, which may have rounded.
+        ``exposed`` is the same scan with the exposures in force, which its camera may have rounded.
         """
-        self._source = source
+        self._frames = exposed or source
         self._shots: tuple[Shot, ...] = tuple(source.plan.shots())
         width, height = source.plan.camera_size_px
         exposures = [setting.exposure_ms for setting in source.plan.settings]
         self._info = CameraInfo(
             "replay", source.plan.name, width, height, bayer, bit_depth, (min(exposures), max(exposures))
         )
-        actual = [setting.exposure_ms for setting in in_force] or exposures
+        actual = [setting.exposure_ms for setting in self._frames.plan.settings]
         self._in_force_ms = dict(zip(exposures, actual, strict=True))
         self._exposure_ms = actual[0]
         self._index = 0
@@ -75,7 +73,7 @@ class ReplayCamera(Camera):
 
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
         """The saved frame; raises `StoreError` when it is damaged."""
-        pixels = self._source.read(self._shots[self._index]).copy()
+        pixels = self._frames.read(self._shots[self._index]).copy()
         self._taken += 1
         self._time_s += self._exposure_ms / 1000.0
         return Frame(pixels, self._exposure_ms, self._time_s, self._taken)
@@ -104,20 +102,20 @@ def replay_rig(
     calibration: Rig | None = None,
     camera: CameraInfo | None = None,
     projector: ProjectorInfo | None = None,
-    in_force: Sequence[Setting] = (),
+    exposed: FrameSource | None = None,
 ) -> DeviceRig:
     """A rig whose camera plays back ``source``; it waits for nothing.
 
     Without a ``calibration``, the ``camera`` and ``projector`` that the scan was captured with say what
     mosaic of how many bits its frames are, and how long the projector shows one; usual ones are taken without
-    these. ``in_force`` as for `ReplayCamera`. Raises `DeviceError` from its devices when asked for a shot or
+    these. ``exposed`` as for `ReplayCamera`. Raises `DeviceError` from its devices when asked for a shot or
     size that the scan does not have.
     """
     sensor = calibration.sensor if calibration else camera
     eye = (
-        ReplayCamera(source, sensor.bayer, sensor.bit_depth, in_force)
+        ReplayCamera(source, sensor.bayer, sensor.bit_depth, exposed)
         if sensor
-        else ReplayCamera(source, in_force=in_force)
+        else ReplayCamera(source, exposed=exposed)
     )
     known = calibration or projector
     period_ms = known.frame_period_ms if known else 1000.0 / 60.0

@@ -31,4 +31,4 @@ def open_replay(options: dict[str, str]) -> DeviceRig:
     (folder,) = options.values()
     reader = ScanReader(folder)
     known = reader.calibration, reader.manifest.camera, reader.manifest.projector
-    return replay_rig(reader, *known, in_force=as_exposed(reader).plan.settings)
+    return replay_rig(reader, *known, exposed=as_exposed(reader))

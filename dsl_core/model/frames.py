@@ -18,7 +18,8 @@ class Frame:
 
     ``attempts`` counts the exposures it took until this one was kept, and ``corrected`` says what an earlier
     one showed instead of the pattern; ``shown_s`` is the time of day, s, at which the projector had shown the
-    pattern (a runner sets all three).
+    pattern; ``even`` is the mosaic as if exposed for as long as others of its setting, None where it was (a
+    runner sets all four).
     """
 
     pixels: NDArray[np.uint16]
@@ -28,6 +29,12 @@ class Frame:
     attempts: int = 1
     corrected: str = ""
     shown_s: float = 0.0
+    even: NDArray[np.uint16] | None = None
+
+    @property
+    def seen(self) -> NDArray[np.uint16]:
+        """The mosaic to compare with others of its setting, shape (rows, columns), DN."""
+        return self.pixels if self.even is None else self.even
 
 
 class FrameSource(Protocol):

@@ -27,6 +27,8 @@ NEAR_FULL = 0.9
 #: Of one colour, those below this share are ends only where there is also light just below them, or noise,
 #: which grows with the light, in pixels darker than a share of it: so many of them stand out in their row.
 NEARLY_FULL, DARK, NOISY = 0.98, 0.1, 0.1
+#: Exposures that differ by less than this share count as equal: light is not known so well.
+EVEN = 1e-3
 
 
 def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.int64]:
@@ -126,6 +128,19 @@ def _is_noisy(pixels: NDArray[np.unsignedinteger], below_dn: float) -> bool:
     triples = np.lib.stride_tricks.sliding_window_view(flat, 3)
     left, middle, right = triples[triples.max(axis=1) < below_dn].T
     return middle.size >= PILE and float(np.mean((middle - left) * (middle - right) > 0)) > NOISY
+
+
+def as_if_exposed(pixels: NDArray[np.uint16], share: float, sensor: Sensor) -> NDArray[np.uint16]:
+    """A raw mosaic (rows, columns), DN, as it were with ``share`` times its exposure; itself if that is 1.
+
+    Where values end, they stay, and no other exceeds them.
+    """
+    if abs(share - 1.0) <= EVEN:
+        return pixels
+    end = end_near_full(pixels, sensor.full_scale_dn, bayer_channels(sensor.bayer, *pixels.shape))
+    black = np.float32(sensor.black_level_dn)
+    light = np.clip(np.rint(black + (pixels - black) * np.float32(share)), 0, end)
+    return np.where(pixels < end, light.astype(np.uint16), pixels)
 
 
 def digitise(

@@ -118,7 +118,8 @@ def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress 
     """Read the frames of a result's scan around its pixel (x, y); raises `StoreError`, `CalibrationError`."""
     progress, reader = progress or NoProgress(), ScanReader(find_scan(result))
     require_complete(reader)
-    rig, reader = _calibration(reader, result), as_exposed(reader)
+    rig = _calibration(reader, result)
+    reader = as_exposed(reader, rig.sensor)
     plan = reader.plan
     width, height = plan.camera_size_px
     # Even corners keep the phase of the Bayer mosaic.

@@ -105,12 +105,12 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tu
     if check_drift and 0 < len(done) < reader.plan.shot_count:
         sensor = None if reader.calibration is None else reader.calibration.sensor
         gone = (s.index for s in reader.plan.shots() if s.index not in sound)
-        moved = movement_of(reader, sensor, gone, rig.camera.info.bit_depth)
+        moved = movement_of(as_exposed(reader), sensor, gone, rig.camera.info.bit_depth)
         if moved is not None and moved.after is not None:
             # What was captured after a motion does not show how things should be.
             done = [shot for shot in done if shot.index <= moved.after]
         shots, dark = pick_reference_shots(done), pick_dark_shots(done)
-        report = check_movement(rig, reader, shots, pattern_image, dark)
+        report = check_movement(rig, as_exposed(reader), shots, pattern_image, dark)
         if not report.is_stable:
             raise DriftError(report.message)
     return rig, reader.plan
@@ -138,7 +138,7 @@ def reconstruct_scan(
         _require_conditions(folder, reader.manifest, calibration)
     rig, options = with_imported_sensor(reader, calibration_of(reader, calibration)), options or Options()
     proof = read_proof(reader, rig)
-    watched = WatchedSource(exposed := as_exposed(reader))
+    watched = WatchedSource(exposed := as_exposed(reader, rig.sensor))
     progress = progress or NoProgress()
     # An import is dated by when it was made, and nobody knows when its pictures were taken.
     stated = rig if is_import(reader) else aged(rig, reader.manifest.created)
@@ -150,7 +150,7 @@ def reconstruct_scan(
             progress.report("compare frames with their patterns", 0, 0)
             sensor = rig.sensor
             proof = prove(
-                reader, watched.seen, rig, sensor.bit_depth, sensor.bayer, knows_light=not is_import(reader)
+                exposed, watched.seen, rig, sensor.bit_depth, sensor.bayer, knows_light=not is_import(reader)
             )
     doubts = _doubts(reader, proof)
     return result.assign_attrs(
@@ -302,6 +302,7 @@ def linearity_of_scan(folder: Path) -> Linearity:
     """
     reader = ScanReader(folder)
     sensor = sensor_of_scan(reader)
+    reader = as_exposed(reader, sensor)
     levels = sensor.full_scale_dn, sensor.black_level_dn
     try:
         return linearity_of(reader, *levels, _absent(reader))

@@ -153,6 +153,19 @@ def test_light_of_the_room_is_that_of_the_setting(
     assert report.is_stable == (light == 1)
 
 
+def test_an_exposure_that_is_rounded_otherwise_is_no_change_of_light() -> None:
+    """The frames say how long they were exposed: 10 ms before, and 10.4 ms now."""
+    black = 260.0
+    longer = PLAN.model_copy(update={"settings": (Setting(exposure_ms=10.4, level=0.4),)})
+    now = MemorySink(longer)
+    now.frames = dict(_scan(2, lambda scene: 1.04 * scene + black).frames)
+    rig = replace(replay_rig(_scan(2), exposed=now), calibration=published_rig())
+    shots = pick_reference_shots(PLAN.shots())
+    report = check_movement(rig, _scan(1, lambda scene: scene + black), shots, pattern_image)
+    assert report.brightness_ratio == pytest.approx(1.0, abs=0.003)
+    assert report.is_stable
+
+
 def test_black_is_dark_and_so_is_a_pair_of_the_code_but_no_single_picture() -> None:
     shots = list(PLAN.shots())
     assert [shot.role for shot in pick_dark_shots(shots)] == ["black"]

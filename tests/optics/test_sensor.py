@@ -7,7 +7,15 @@ import pytest
 from pydantic import ValidationError
 
 from dsl_core.model.rig import FlatField, Rig, Sensor
-from dsl_core.optics.sensor import digitise, end_near_full, gain_at_pixels, raw_variance, relative_gain
+from dsl_core.optics.sensor import (
+    EVEN,
+    as_if_exposed,
+    digitise,
+    end_near_full,
+    gain_at_pixels,
+    raw_variance,
+    relative_gain,
+)
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
 
@@ -140,3 +148,18 @@ def test_neither_noise_nor_full_scale_nor_what_cuts_values_off_is_such_an_end(
     sensor = Sensor(black_level_dn=0.0, saturation_dn=ends_dn)
     values = digitise(sensor, np.full((60, 90), light * 4095, np.float32), np.random.default_rng(0))
     assert end_near_full(values, 4095, np.zeros_like(values)) == 4095
+
+
+@pytest.mark.parametrize("share", [0.95, 1.05])
+@pytest.mark.parametrize("ends_dn", [4095, 4080])
+def test_light_follows_the_exposure_and_values_end_where_they_did(share: float, ends_dn: int) -> None:
+    sensor, rng = Sensor(black_level_dn=100.0), np.random.default_rng(0)
+    light = np.linspace(0.0, 6000.0, 40_000).reshape(200, 200)
+    pixels = np.clip(100 + light + rng.normal(0, 5, light.shape), 0, ends_dn).round().astype(np.uint16)
+    found = as_if_exposed(pixels, share, sensor)
+    assert found.dtype == np.uint16
+    assert np.all(found[pixels == ends_dn] == ends_dn)
+    assert found.max() == ends_dn
+    below = light < 0.94 * (ends_dn - 100)
+    np.testing.assert_allclose(found[below], 100 + share * (pixels[below] - 100.0), atol=0.51)
+    assert as_if_exposed(pixels, 1 + 0.9 * EVEN * np.sign(share - 1), sensor) is pixels

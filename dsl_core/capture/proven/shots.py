@@ -27,7 +27,7 @@ from dsl_core.capture.proven.wrong_pictures import (
 from dsl_core.capture.put_back import ADVICE
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame, FrameSink, FrameSource, NotedSource
-from dsl_core.model.plan import Shot, describe_shot
+from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.progress import CancelToken
 
 #: How often a shot is taken again before the scan stops, and how long the pattern may settle before that, ms.
@@ -82,8 +82,8 @@ class ProvenShots:
         past = () if self._proof is None else self._proof.past
         return [each for each in (self._light, *past) if each]
 
-    def learn(self, stored: FrameSource, missing: Collection[int]) -> None:
-        """Judge the frames of earlier runs, all but those ``missing``; wrong ones are taken again.
+    def learn(self, stored: FrameSource, plan: CapturePlan, missing: Collection[int]) -> None:
+        """Judge the frames of earlier runs of a plan, all but those ``missing``; wrong ones are taken again.
 
         So are the last ones before a missing shot that cannot be told: what stopped the scan may have begun
         with them.
@@ -92,7 +92,7 @@ class ProvenShots:
             return
         tail: list[Shot] = []
         again: list[Shot] = []
-        for shot in stored.plan.shots():
+        for shot in plan.shots():
             if shot.index in missing:
                 again += tail[-MOST_UNTOLD:]
                 tail = []
@@ -149,7 +149,7 @@ class ProvenShots:
         if self._proof is None:
             self._sink.write(shot, frame)
             return
-        found = self._proof.judge(shot, frame.pixels)
+        found = self._proof.judge(shot, frame.seen)
         if found.is_doubtful:
             frame, found = self._ask_again(found, frame, self._proof)
         elif self._proof.is_alone(found) and not self._is_late:
@@ -162,13 +162,13 @@ class ProvenShots:
         if found.verdict is Verdict.LATE or found.colour:
             self._lateness.count_late(found)
         passed = self._proof.passed
-        if passed is not None and self._proof.is_past(self._again(passed.again[0]).pixels):
+        if passed is not None and self._proof.is_past(self._again(passed.again[0]).seen):
             self._correct(passed, self._proof)
         self._correct(found, self._proof)
         if self._is_late:
             return
         if shot.role == "sentinel" and not found.is_wrong:
-            self._proof.scene.see_settled(shot, frame.pixels, self._pixels)
+            self._proof.scene.see_settled(shot, frame.seen, self._pixels)
         if self._lateness.is_told(shot):
             if self._lateness.comes_and_goes(shot):
                 self._doubted.doubt_passed()
@@ -179,14 +179,14 @@ class ProvenShots:
         return self._taker.take(shot, earlier + 1, SETTLE_MS[earlier], twice=True)
 
     def _pixels(self, shot: Shot, is_longer: bool) -> NDArray[np.uint16]:
-        return (self._again(shot) if is_longer else self._taker.take(shot)).pixels
+        return (self._again(shot) if is_longer else self._taker.take(shot)).seen
 
     def _save(self, shot: Shot, frame: Frame, found: Finding) -> None:
         """Save a picture that was not found wrong, and note if little is known of it."""
         self._sink.write(shot, frame)
-        self._diagnosis.keep(shot, frame.pixels)
+        self._diagnosis.keep(shot, frame.seen)
         if self._proof is not None:
-            self._date(shot, frame.pixels, self._proof)
+            self._date(shot, frame.seen, self._proof)
         self._doubted.add(shot, is_untold=not found.is_sure and self._is_alone(shot))
 
     def _date(self, shot: Shot, pixels: NDArray[np.uint16], proof: FrameProof) -> None:
@@ -208,11 +208,11 @@ class ProvenShots:
     def _ask_again(self, doubt: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
         """A second picture of a shot that may be wrong, and what it shows."""
         second = self._again(doubt.shot)
-        differs = proof.differ(frame.pixels, second.pixels)
-        found = proof.judge(doubt.shot, second.pixels)
+        differs = proof.differ(frame.seen, second.seen)
+        found = proof.judge(doubt.shot, second.seen)
         has_mark = doubt.verdict is Verdict.RIGHT or bool(doubt.detail)
         if differs or (has_mark and not found.is_doubtful):
-            colour = doubt.colour or proof.late_colour(doubt.shot, frame.pixels, second.pixels)
+            colour = doubt.colour or proof.late_colour(doubt.shot, frame.seen, second.seen)
             if colour:
                 self._lateness.count_late(replace(doubt, colour=colour))
             self._lateness.count_cured(found)
@@ -227,11 +227,11 @@ class ProvenShots:
     def _compare(self, alone: Finding, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
         """A picture that nothing tells, if another one of its shot is the same; else a third."""
         second = self._taker.take(alone.shot, 1)
-        if not proof.differ_at_first(alone.shot, frame.pixels, second.pixels):
+        if not proof.differ_at_first(alone.shot, frame.seen, second.seen):
             return frame, alone
         self.corrected += 1
         third = self._again(alone.shot, 1)
-        return replace(third, corrected="two pictures of it differed"), proof.judge(alone.shot, third.pixels)
+        return replace(third, corrected="two pictures of it differed"), proof.judge(alone.shot, third.seen)
 
     def _correct(self, found: Finding, proof: FrameProof) -> None:
         before, now = dict[Shot, NDArray[np.uint16]](), dict[Shot, NDArray[np.uint16]]()
@@ -247,8 +247,8 @@ class ProvenShots:
             taken: list[tuple[Shot, Frame, Finding]] = []
             for shot in wrong:
                 frame = replace(self._again(shot, earlier), corrected=reason)
-                taken.append((shot, frame, proof.judge(shot, frame.pixels)))
-            before, now = now, {shot: frame.pixels for shot, frame, _ in taken}
+                taken.append((shot, frame, proof.judge(shot, frame.seen)))
+            before, now = now, {shot: frame.seen for shot, frame, _ in taken}
             found = last_wrong([each for *_, each in taken])
             if len(wrong) > 1 and wrong[-1].role == "spectral" and not found.is_wrong:
                 # They agree now; but so do two wrong ones, and the earlier one may have been right.
@@ -260,7 +260,7 @@ class ProvenShots:
         if found.is_wrong:
             change = self._explain()
             if not change.sentence:
-                of_picture = self._diagnosis.explain_picture(frame.pixels)
+                of_picture = self._diagnosis.explain_picture(frame.seen)
                 change = of_picture if of_picture.sentence else change
             is_steady = proof.scene.repeats(found.again, before, now)
             advice = f"{what_to_do(found, change, proof, is_steady)} {self._next_step.then}"
@@ -286,7 +286,7 @@ class ProvenShots:
         )
         for each in tuple(self._doubted.untold):
             frame = replace(self._again(each), corrected="it may be late")
-            found = proof.judge(each, frame.pixels)
+            found = proof.judge(each, frame.seen)
             if each not in found.again:
                 self._save(each, frame, found)
                 self.corrected += 1
@@ -310,14 +310,14 @@ class ProvenShots:
         is_sound = True
         for control in controls:
             frame = self._again(control)
-            if not proof.scene.is_as_before(control, frame.pixels):
+            if not proof.scene.is_as_before(control, frame.seen):
                 # It may be wrong for once, as any other.
                 frame = self._again(control, 1)
-            if proof.scene.is_as_before(control, frame.pixels):
-                is_sound &= proof.scene.is_unchanged(control, frame.pixels)
+            if proof.scene.is_as_before(control, frame.seen):
+                is_sound &= proof.scene.is_unchanged(control, frame.seen)
                 continue
             reason = self._explain().sentence
-            reason = reason or why_control_differs(proof.scene.shows_mirrored(control, frame.pixels))
+            reason = reason or why_control_differs(proof.scene.shows_mirrored(control, frame.seen))
             raise PictureError(
                 f"{describe_shot(control).capitalize()}, captured once more as a control, no longer shows its"
                 f" pattern. {reason} {self._next_step.then} Frames before are saved.",
@@ -357,17 +357,17 @@ class ProvenShots:
         if shots is None:
             return
         white, dim = shots
-        if proof.scene.compare_whites(self._taker.take(dim, twice=self._is_late).pixels):
+        if proof.scene.compare_whites(self._taker.take(dim, twice=self._is_late).seen):
             return
         # The picture may be late, and the light may have changed since white.
-        if not proof.scene.compare_whites(self._again(dim).pixels, self._again(white).pixels):
+        if not proof.scene.compare_whites(self._again(dim).seen, self._again(white).seen):
             _log.warning("%s", proof.scene.levels)
 
     def _require_place(self, first: Shot, proof: FrameProof) -> None:
         """See that a picture of the code, captured once more, is where it was."""
-        if not proof.scene.is_displaced(first, self._taker.take(first, twice=self._is_late).pixels):
+        if not proof.scene.is_displaced(first, self._taker.take(first, twice=self._is_late).seen):
             return
-        if not proof.scene.is_displaced(first, self._again(first).pixels):
+        if not proof.scene.is_displaced(first, self._again(first).seen):
             return
         raise PictureError(
             f"{describe_shot(first).capitalize()}, captured once more, is displaced from where it was:"
@@ -381,7 +381,7 @@ class ProvenShots:
     def _explain(self) -> Explanation:
         """What has changed since the scan began; nothing where that does not show."""
         try:
-            return self._diagnosis.explain(lambda shot: self._again(shot).pixels)
+            return self._diagnosis.explain(lambda shot: self._again(shot).seen)
         except DeviceError as error:
             _log.warning("No pictures could be taken to see what has changed: %s", error)
             return Explanation()

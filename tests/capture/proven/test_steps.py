@@ -236,7 +236,7 @@ def test_wrong_ones_are_taken_again_with_longer_waits() -> None:
 def test_why_frames_of_an_earlier_run_were_taken_again_is_looked_at() -> None:
     bench, stored = Bench(is_right), Stored()
     stored.corrected = lambda shot: f"why {shot.index}"  # type: ignore[attr-defined]
-    bench.shots.learn(stored, range(2, len(SHOTS)))  # type: ignore[arg-type]
+    bench.shots.learn(stored, stored.plan, range(2, len(SHOTS)))  # type: ignore[arg-type]
     assert bench.recalled == {0: "why 0", 1: "why 1"}
 
 
@@ -730,17 +730,17 @@ class Stored:
 def test_frames_right_before_a_missing_one_are_taken_again_where_nothing_tells_of_them() -> None:
     bench = Bench(untold)
     stored: Any = Stored()
-    bench.shots.learn(stored, {15})
+    bench.shots.learn(stored, stored.plan, {15})
     # Lines 12 to 14; the code is judged together.
     assert [index for index, *_ in bench.taken] == [12, 13, 14]
     calm = Bench(*[untold] * 13, is_right, untold)
-    calm.shots.learn(stored, {15})
+    calm.shots.learn(stored, stored.plan, {15})
     assert [index for index, *_ in calm.taken] == [14], "from the last that was told on"
     whole = Bench(untold)
-    whole.shots.learn(stored, ())
+    whole.shots.learn(stored, stored.plan, ())
     assert whole.taken == []
     wrong = Bench(*[is_right] * 13, late, is_right)
-    wrong.shots.learn(stored, ())
+    wrong.shots.learn(stored, stored.plan, ())
     assert wrong.taken == [(13, 1, 100.0, True)]
     assert sorted(wrong.kept) == list(range(len(SHOTS))), "a wrong one only once it is right"
 
@@ -749,7 +749,7 @@ def test_thirty_two_frames_before_a_missing_one_are_taken_again_at_most() -> Non
     bench, stored = Bench(untold), Stored()
     stored.plan = PLAN.model_copy(update={"spectral": LineComb(width_px=1, step_px=1, period_px=40)})
     count = len(tuple(stored.plan.shots()))
-    bench.shots.learn(stored, {count - 1})  # type: ignore[arg-type]
+    bench.shots.learn(stored, stored.plan, {count - 1})  # type: ignore[arg-type]
     assert [index for index, *_ in bench.taken] == list(range(count - 33, count - 1))
 
 

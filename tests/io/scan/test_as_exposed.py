@@ -12,11 +12,13 @@ import pytest
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
-from dsl_core.model.frames import Frame
+from dsl_core.model.frames import Frame, read_rows
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
-from dsl_core.pipeline import scan
+from dsl_core.model.presets import preset_plan
+from dsl_core.model.rig import Sensor
+from dsl_core.pipeline import fit_plan, scan
 from dsl_core.simulation.sim_devices import open_twin
-from dsl_core.workflows.scans import reconstruct_scan
+from dsl_core.workflows.scans import known_doubts, reconstruct_scan, resume
 from tests.cases.rounding import Rounding
 
 PLAN = CapturePlan(
@@ -52,6 +54,64 @@ def test_the_median_of_each_setting_is_in_force(tmp_path: Path) -> None:
     assert reader.plan == PLAN, "what was planned stays known"
     last = list(exposed.plan.shots())[-1]
     assert exposed.read(last)[0, 0] == last.index
+
+
+def test_frames_that_were_exposed_otherwise_are_read_with_the_light_of_the_others(tmp_path: Path) -> None:
+    reader = reader_of(tmp_path / "a.dsl", lambda index, ms: 1.03 * ms if index in (18, 19) else ms)
+    exposed = as_exposed(reader, Sensor(black_level_dn=0.0, bit_depth=8))
+    assert exposed.plan == PLAN
+    for shot in PLAN.shots():
+        wanted = round(shot.index / 1.03) if shot.index in (18, 19) else shot.index
+        out = np.empty((16, 24), np.uint16)
+        assert exposed.read(shot, out) is out
+        assert {*out.ravel(), *read_rows(exposed, shot, slice(2, 4)).ravel()} == {wanted}
+    assert as_exposed(reader) is reader, "black is not known"
+
+
+class Uneven(Rounding):
+    """Exposes each frame for another time, and says so."""
+
+    def configure(self, exposure_ms: float) -> float:
+        self.wanted_ms = exposure_ms
+        return exposure_ms
+
+    def snap(self, timeout_ms: float = 5000.0) -> Frame:
+        self.camera.configure(self.longer(self.wanted_ms) * self.wanted_ms)
+        return self.camera.snap(timeout_ms)
+
+
+def test_exposures_that_differ_from_frame_to_frame_are_no_light_that_does(tmp_path: Path) -> None:
+    shares = np.random.default_rng(1).uniform(0.955, 1.045, 1000).tolist()
+    rig = open_twin({"size": "48x32", "scene": "plane", "noise": "on"})
+    rig = replace(rig, camera=Uneven(rig.camera, lambda ms: shares.pop()))
+    plan = preset_plan("quick")
+    assert plan is not None
+    status = scan(rig, fit_plan(plan, rig), tmp_path / "a.dsl")
+    assert status.corrected == 0
+    assert known_doubts(tmp_path / "a.dsl") == []
+
+
+def test_a_scan_is_resumed_by_a_camera_that_rounds_exposures_otherwise(tmp_path: Path) -> None:
+    rig, plan, left = (
+        open_twin({"size": "48x32", "noise": "on", "brightness": "0.3"}),
+        preset_plan("quick"),
+        20,
+    )
+    assert plan is not None
+
+    def first(wanted_ms: float) -> float:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return 1.0
+
+    with pytest.raises(KeyboardInterrupt):
+        scan(replace(rig, camera=Uneven(rig.camera, first)), fit_plan(plan, rig), tmp_path / "a.dsl")
+    assert 0 < len(ScanReader(tmp_path / "a.dsl").missing()) < plan.shot_count
+    status = resume(replace(rig, camera=Uneven(rig.camera, lambda ms: 1.04)), tmp_path / "a.dsl")
+    assert status.corrected == 0
+    assert known_doubts(tmp_path / "a.dsl") == []
 
 
 def rounding_rig(longer: Callable[[float], float]) -> DeviceRig:
