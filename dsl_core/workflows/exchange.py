@@ -13,7 +13,7 @@ from dsl_core.errors import DslError, StoreError
 from dsl_core.io.published.calibration import check_calibration, holds_calibration, load_calibration
 from dsl_core.io.published.dataset import PUBLISHED_SETTINGS, export_dataset, open_dataset
 from dsl_core.io.published.layout import FileRecord, survey
-from dsl_core.io.published.stereo_words import doubts
+from dsl_core.io.published.stereo_words import doubts as doubts_of
 from dsl_core.io.scan.as_exposed import as_exposed
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
@@ -43,17 +43,23 @@ def export_scan(
 
 @dataclass(frozen=True)
 class FolderLook:
-    """What a folder of another program holds: its table of files, and what keeps it from being imported."""
+    """What a folder of another program holds: its table of files, and what keeps it from being imported.
+
+    ``doubts`` are what speaks against the numbers of a calibration that can be imported.
+    """
 
     kind: Literal["scan", "calibration"]
     table: Sequence[FileRecord]
     obstacle: str = ""
+    doubts: tuple[str, ...] = ()
 
 
-def look_at(root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None) -> FolderLook:
+def look_at(
+    root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None, unit_mm: float = 1.0
+) -> FolderLook:
     """Look at a folder in the published layout, or one that should be, without writing anything.
 
-    ``base`` as for `import_scan` and `import_calibration`. Raises `StoreError` when there is no such folder,
+    Arguments as for `import_scan` and `import_calibration`. Raises `StoreError` when there is no such folder,
     or nothing in it.
     """
     if not root.is_dir():
@@ -61,11 +67,12 @@ def look_at(root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None
     refuse_empty(root)
     if not holds_calibration(root):
         return _look_at_scan(root, base)
+    table = check_calibration(root)
     try:
-        import_calibration(root, base, camera_size_px)
+        _, doubts = import_calibration(root, base, camera_size_px, unit_mm=unit_mm)
     except DslError as error:
-        return FolderLook("calibration", check_calibration(root), str(error))
-    return FolderLook("calibration", check_calibration(root))
+        return FolderLook("calibration", table, str(error))
+    return FolderLook("calibration", table, doubts=tuple(doubts))
 
 
 def refuse_empty(root: Path) -> None:
@@ -133,4 +140,4 @@ def import_calibration(
     """
     size = projector_size_px or (base.projector.width_px, base.projector.height_px)
     found = load_calibration(root, size, camera_size_px).in_units_of(unit_mm)
-    return found.rig(base), list(doubts(found.stereo))
+    return found.rig(base), list(doubts_of(found.stereo))

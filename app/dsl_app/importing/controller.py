@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from dsl_app.importing.captures.state import checks_of
 from dsl_app.importing.state import (
     PUBLISHED,
     SUFFIXES,
@@ -27,7 +28,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
 #: Fields that decide whether a folder can be imported; after a change it is checked again.
-_CHECKED = {"folder", "base", "camera_px"}
+_CHECKED = {"folder", "base", "camera_px", "unit_mm"}
 
 
 class ImportController:
@@ -134,9 +135,14 @@ def look_at(request: ImportRequest, library: CalibrationLibrary) -> Found:
 
     if reason := barrier(request.folder):
         raise StoreError(f"{request.folder} cannot be read ({reason}). Choose another folder.")
-    look = exchange.look_at(request.folder, base_of(request, library), _size(request))
+    look = exchange.look_at(request.folder, base_of(request, library), _size(request), request.unit_mm)
     return Found(
-        request.folder, look.kind, rows_of(look.table), summary_of(look.kind, look.table), look.obstacle
+        request.folder,
+        look.kind,
+        rows_of(look.table),
+        summary_of(look.kind, look.table),
+        look.obstacle,
+        " ".join(checks_of(look.doubts)),
     )
 
 
@@ -156,7 +162,10 @@ def import_calibration(request: ImportRequest, library: CalibrationLibrary, prog
     from dsl_core.workflows import exchange
 
     progress.report("read the calibration", 0, 0)
-    rig, _ = exchange.import_calibration(request.folder, base_of(request, library), _size(request))
+    # Doubts were told when the folder was looked at.
+    rig, _ = exchange.import_calibration(
+        request.folder, base_of(request, library), _size(request), unit_mm=request.unit_mm
+    )
     return save_rig(rig, request.target)
 
 

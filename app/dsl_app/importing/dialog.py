@@ -16,12 +16,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dsl_app.importing.captures.unit_box import unit_box
 from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, ImportState, import_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widgets.ask_file import ask_file
 from dsl_app.shared.widgets.dialogs import JobDialog, use_room
-from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, named, push_button, set_role
+from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, named, push_button, quiet, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_app.shared.widgets.open_dialog import OpenDialog
@@ -98,6 +99,8 @@ class ImportDialog(JobDialog):
         )  # fmt: skip
         for box in (self.width_px, self.height_px):
             box.setSpecialValueText("as in the file")
+        self.unit_mm = unit_box()
+        self.doubts = label("", "warn", wraps=True)
 
     def _make_target(self, request: ImportRequest) -> None:
         tip = "Name of the imported scan or calibration; the ending is added"
@@ -115,6 +118,8 @@ class ImportDialog(JobDialog):
         self._form = QFormLayout()
         self._form.addRow("Film, sensor, scales", _row(self.base, self.file))
         self._form.addRow("Camera's images", self._size)
+        self._form.addRow("Unit of lengths", self.unit_mm)
+        self._form.addRow("", self.doubts)
         self._form.addRow("Name", self.name)
         self._form.addRow("In folder", _row(self.home, self.browse))
         self.column.addLayout(head)
@@ -132,6 +137,7 @@ class ImportDialog(JobDialog):
             box.valueChanged.connect(
                 lambda _: commands.change(camera_px=(self.width_px.value(), self.height_px.value()))
             )
+        self.unit_mm.valueChanged.connect(lambda unit_mm: commands.change(unit_mm=unit_mm))
 
     # Show ------------------------------------------------------------------------------------------
 
@@ -140,7 +146,10 @@ class ImportDialog(JobDialog):
             return
         self._folder.setText(breakable(found.folder))
         self._summary.setText(found.summary)
-        self._form.setRowVisible(self._size, import_view(self._state).asks_size)
+        self.doubts.setText(found.doubts)
+        self._form.setRowVisible(self.doubts, bool(found.doubts))
+        for row in (self._size, self.unit_mm):
+            self._form.setRowVisible(row, import_view(self._state).asks_lengths)
         self.table.show_rows([self._items(row) for row in found.rows])
 
     def _items(self, row: FileRow) -> tuple[Any, ...]:
@@ -161,6 +170,10 @@ class ImportDialog(JobDialog):
         self.base.choose(request.base)
         # Text that is being typed is not replaced.
         is_other, self._shown = request.folder != self._shown, request.folder
+        with quiet(self.width_px, self.height_px, self.unit_mm):
+            self.unit_mm.setValue(request.unit_mm)
+            for box, size_px in zip((self.width_px, self.height_px), request.camera_px, strict=True):
+                box.setValue(size_px)
         for field, text in ((self.name, request.target.stem), (self.home, str(request.target.parent))):
             if is_other or not field.hasFocus():
                 field.setText(text)

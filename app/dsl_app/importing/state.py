@@ -40,26 +40,32 @@ class FileRow:
 
 @dataclass(frozen=True)
 class Found:
-    """What a folder contains; ``summary`` counts it, ``obstacle`` (if any) prevents its import."""
+    """What a folder contains; ``summary`` counts it, ``obstacle`` (if any) prevents its import.
+
+    ``doubts`` (if any) say what of a calibration may not be meant like that.
+    """
 
     folder: Path
     kind: Literal["scan", "calibration"]
     rows: tuple[FileRow, ...]
     summary: str
     obstacle: str = ""
+    doubts: str = ""
 
 
 @dataclass(frozen=True)
 class ImportRequest:
     """How to import: ``base`` is `PUBLISHED`, a name of the library or the path of a file.
 
-    ``camera_px`` is the image size of a calibration; 0 leaves it to the file.
+    ``camera_px`` is the image size of a calibration; 0 leaves it to the file. Its lengths are in units of
+    ``unit_mm``.
     """
 
     folder: Path
     target: Path
     base: str = PUBLISHED
     camera_px: tuple[int, int] = (0, 0)
+    unit_mm: float = 1.0
 
 
 class ImportState:
@@ -149,6 +155,8 @@ def command_of(found: Found, request: ImportRequest) -> str:
         words.append(f"--calibration {quoted(request.base)}")
     if found.kind == "calibration" and all(request.camera_px):
         words.append("--camera-size {}x{}".format(*request.camera_px))
+    if found.kind == "calibration" and request.unit_mm != 1:
+        words.append(f"--unit-mm {request.unit_mm:g}")
     return " ".join(words)
 
 
@@ -156,13 +164,14 @@ def command_of(found: Found, request: ImportRequest) -> str:
 class ImportView:
     """What the dialog says below its form: ``trouble`` prevents the import, ``remark`` says what it makes.
 
-    Nothing on the form helps a folder that ``is_hopeless``: another one has to be chosen.
+    Nothing on the form helps a folder that ``is_hopeless``: another one has to be chosen. Sizes and unit may
+    help a calibration.
     """
 
     trouble: str
     remark: str
     is_busy: bool
-    asks_size: bool
+    asks_lengths: bool
     is_hopeless: bool
 
 
@@ -178,5 +187,5 @@ def import_view(state: ImportState) -> ImportView:
         f"{busy}…" if busy else remark,
         bool(busy),
         is_calibration,
-        not busy and found is not None and bool(found.obstacle),
+        not busy and found is not None and bool(found.obstacle) and not is_calibration,
     )

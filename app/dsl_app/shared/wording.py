@@ -38,7 +38,6 @@ PHRASES = (
     ("; they give the camera's lens (--camera-only).", "."),
     ("; give --projector", ""),
     ("Give its right size (--projector).", "Correct the projector's size."),
-    ("give --unit-mm 1000 to 'dsl-scan import'", "convert them to mm"),
     ("give --unit-mm 1000", "set their unit to 1000 mm"),
     ("give --unit-mm", "set their unit"),
     ("Correct --camera-size, or calibrate with that size.", "Choose the calibration of these pictures."),

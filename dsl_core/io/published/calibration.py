@@ -87,7 +87,7 @@ class PublishedCalibration:
         except ValidationError as error:
             raise CalibrationError(
                 f"The calibration makes no rig: {problems_in_words(error)}. Correct its files; if its"
-                " lengths are in metres, give --unit-mm 1000 to 'dsl-scan import'."
+                " lengths are in metres, give --unit-mm 1000."
             ) from error
 
     def in_units_of(self, unit_mm: float) -> PublishedCalibration:

@@ -17,6 +17,7 @@ from dsl_app.shared.known_files import Kind, kind_of
 from dsl_core.cli import main
 from dsl_core.errors import Cancelled
 from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.published.calibration import export_calibration
 from dsl_core.io.published.layout import FileRecord
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.folder import ScanReader
@@ -114,6 +115,27 @@ def test_a_calibration_becomes_a_file(bench: Bench, made: Folders) -> None:
     bench.control.change(camera_px=(890, 580), target=bench.home / "b.json")
     assert "64 x 48" in bench.trouble
     assert not bench.control.start()
+
+
+def test_a_calibration_is_doubted_and_read_in_a_unit_as_by_the_command(
+    bench: Bench, made: Folders, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = load_rig(made.own)
+    there = own.pose.model_copy(update={"translation_mm": tuple((own.pose.vector_mm / 25.4).tolist())})
+    export_calibration(own.model_copy(update={"pose": there}), tmp_path / "inches")
+    bench.look(tmp_path / "inches")
+    assert bench.trouble == ""
+    assert bench.found.doubts.startswith("Check: the projector would be 2.46 mm from the camera; if lengths")
+    assert bench.found.doubts.endswith("are in metres, set their unit to 1000 mm.")
+    bench.control.change(unit_mm=25.4)
+    assert bench.found.doubts == ""
+    words = shlex.split(bench.control.command_line())
+    assert main([*words[1:-3], str(tmp_path / "by command.json"), *words[-2:]]) == 0, capsys.readouterr().err
+    assert bench.control.start()
+    for path in (*bench.done, tmp_path / "by command.json"):
+        assert load_rig(path).pose.vector_mm == pytest.approx(own.pose.vector_mm)
+    bench.control.change(unit_mm=0.1)
+    assert "if its lengths are in metres, give --unit-mm 1000." in bench.trouble
 
 
 def test_what_is_missing_or_misnamed_has_a_line_each(bench: Bench, made: Folders, scene: Path) -> None:

@@ -15,6 +15,8 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QPlainTextEdit
 from pytestqt.qtbot import QtBot
 
 from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.published.calibration import export_calibration
+from dsl_core.io.rig_file import load_rig
 from tests.app.composition.test_drops import drop
 from tests.app.composition.test_names import complaints
 from tests.app.importing.published_folders import Folders, make_folders
@@ -94,6 +96,31 @@ def test_a_calibration_ends_in_the_library(
     QTest.mouseClick(dialog.go, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: CalibrationLibrary().names() != (), timeout=PATIENCE_MS)
     assert window.page == "calibrate"
+
+
+def test_doubts_about_a_calibration_are_shown_until_its_unit_is_right(
+    qtbot: QtBot, window: MainWindow, made: Folders, tmp_path: Path
+) -> None:
+    own = load_rig(made.own)
+    there = own.pose.model_copy(update={"translation_mm": tuple((own.pose.vector_mm / 1000).tolist())})
+    export_calibration(own.model_copy(update={"pose": there}), tmp_path / "metres")
+    window.open_path(tmp_path / "metres")
+    dialog = opened(qtbot, window)
+    assert complaints(dialog) == []
+    assert "if its lengths are in metres, set their unit to 1000 mm." in dialog.text.text()
+    assert not dialog.go.isEnabled()
+    # Enter in the box of the unit must not lead to another folder.
+    assert not dialog.other.isDefault()
+    dialog.unit_mm.setValue(20)
+    qtbot.waitUntil(dialog.doubts.isVisible, timeout=PATIENCE_MS)
+    assert "the projector would be 1.25 mm from the camera" in dialog.doubts.text()
+    dialog.unit_mm.setValue(1000)
+    qtbot.waitUntil(lambda: dialog.go.isEnabled() and not dialog.doubts.isVisible(), timeout=PATIENCE_MS)
+    window.open_path(made.rig)
+    qtbot.waitUntil(lambda: dialog.name.text() == "rig", timeout=PATIENCE_MS)
+    assert dialog.unit_mm.value() == 1
+    assert dialog.go.isEnabled()
+    dialog.reject()
 
 
 def test_another_folder_is_shown_in_the_same_dialog(

@@ -11,7 +11,7 @@ def test_the_dialog_says_what_it_makes_and_what_prevents_it() -> None:
     state.request.set(ImportRequest(Path("leaf"), Path("home/leaf.dsl")))
     state.found.set(Found(Path("leaf"), "scan", (), ""))
     view = import_view(state)
-    assert (view.trouble, view.remark, view.is_busy, view.asks_size) == (
+    assert (view.trouble, view.remark, view.is_busy, view.asks_lengths) == (
         "",
         "Creates leaf.dsl.",
         False,
@@ -26,7 +26,7 @@ def test_a_calibration_also_asks_its_size_and_goes_to_the_library() -> None:
     state.request.set(ImportRequest(Path("rig"), Path("home/rig.json")))
     state.found.set(Found(Path("rig"), "calibration", (), ""))
     view = import_view(state)
-    assert view.asks_size
+    assert view.asks_lengths
     assert view.remark == "Creates rig.json. The calibration is also added to the library."
 
 

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QFileDialog, QFormLayout, QLabel, QLineEdit, QMenu
 from dsl_app.importing.captures.parts_editor import PartsEditor
 from dsl_app.importing.captures.pictures import DecodedPicture, FilesTable
 from dsl_app.importing.captures.state import NOMINAL, NONE, CapturesState, Said, captures_view
+from dsl_app.importing.captures.unit_box import unit_box
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.plain_tip import plain_tip
@@ -19,7 +20,6 @@ from dsl_app.shared.widgets.ask_file import ask_file
 from dsl_app.shared.widgets.dialogs import JobDialog, use_room
 from dsl_app.shared.widgets.forms import (
     ChoiceBox,
-    NumberBox,
     WholeBox,
     check_box,
     label,
@@ -117,8 +117,7 @@ class CapturesDialog(JobDialog):
             "F&ile…", "Choose a rig's file, or lenses and pose of another program (XML, YAML, JSON)",
             self._choose_rig,
         )  # fmt: skip
-        tip = "Length of one unit of the file: 1 for millimetres, 1000 for metres"
-        self.unit_mm = NumberBox("Unit of lengths", 1e-6, 1e6, 1.0, "mm", 3, tip)
+        self.unit_mm = unit_box()
         self.from_projector = check_box(
             "From projector", "The pose of the file leads from the projector to the camera, not the usual way"
         )

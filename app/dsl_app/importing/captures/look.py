@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from dsl_app.importing.captures.fields import first_mapping
 from dsl_app.importing.captures.state import (
-    DOUBT,
     NO_FILE,
     NOMINAL,
     NONE,
@@ -23,10 +22,10 @@ from dsl_app.importing.captures.state import (
     Place,
     Size,
     Stated,
+    checks_of,
 )
 from dsl_app.shared.notify import sentence_of
 from dsl_app.shared.paths import is_file
-from dsl_app.shared.wording import in_window
 from dsl_core.errors import CalibrationError, DslError
 from dsl_core.io.pictures.mapping import Mapping
 from dsl_core.progress import NoProgress, Progress
@@ -149,8 +148,7 @@ def _stereo(path: Path, request: CaptureRequest, camera_px: Size, projector_px: 
     tables = ("camera", request.camera_curves), ("LEDs", request.led_curves)
     curves = [None if table is None else load_curves(table, device) for device, table in tables]
     rig = lenses_on(published_rig(), found, path.name, *curves)
-    said = [f"{DOUBT}{in_window(each)}." for each in found.doubts]
-    said.append(f"{path.name}: {placed(found.stereo)}.")
+    said = [*checks_of(found.doubts), f"{path.name}: {placed(found.stereo)}."]
     said += [f"Missing, so assumed: {', '.join(found.assumed)}."] if found.assumed else []
     taken = [*found.taken, *(each.words for each in curves if each is not None)]
     said.append(f"Understood: {'; '.join(taken)}.")

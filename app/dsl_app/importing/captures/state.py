@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -229,6 +229,11 @@ def _about_mapping(stated: Stated | None) -> Said:
     return Said(
         "Unsure: " + "; ".join(in_window(f"{each}.")[:-1] for each in stated.mapping.unsure) + ".", "warn"
     )
+
+
+def checks_of(doubts: Iterable[str]) -> list[str]:
+    """What speaks against a calibration of another program, a sentence for each."""
+    return [f"{DOUBT}{in_window(each)}." for each in doubts]
 
 
 def _about_calibration(told: str) -> Said:

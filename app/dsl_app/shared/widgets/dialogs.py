@@ -22,6 +22,7 @@ from dsl_app.shared.plain_tip import plain_tip
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
 from dsl_app.shared.widgets.inside import stop_following
 from dsl_app.shared.widgets.layouts import column_of
+from dsl_app.shared.wording import in_window
 
 #: Share of the window that a dialog of tables or plots takes.
 SHARE = 0.65
@@ -149,7 +150,7 @@ class JobDialog(QDialog):
 
     def show_status(self, trouble: str, remark: str, is_busy: bool = False) -> None:
         """Show what is wrong, else the remark; the work can only start when nothing is wrong."""
-        self.text.setText(trouble or remark)
+        self.text.setText(in_window(trouble) or remark)
         set_role(self.text, "warn" if trouble else "muted")
         self.go.setEnabled(not trouble and not is_busy)
 
