@@ -93,8 +93,8 @@ def require_bands(bands_nm: Floats, light: str, whose: str = "") -> None:
         least = int((seen - LEAST_SEEN).argmin())
         raise DecodeError(
             f"The bands{whose}, {bands_nm.min():g} to {bands_nm.max():g} nm, hold {seen[least]:.0%} of"
-            f" {'XYZ'[least]} under {light}: too little for a colour. Reconstruct bands from about 430 to 660"
-            " nm, mask none of them, or choose another light."
+            f" {'XYZ'[least]} under {light}: too little for a colour. Reconstruct bands of 30 nm or finer"
+            " from about 430 to 660 nm, mask none of them, or choose another light."
         )
 
 

@@ -140,6 +140,13 @@ def test_a_line_across_a_wide_gap_makes_no_colour(kept_nm: tuple[float, ...]) ->
     assert not hold_colour(NM[kept])
 
 
+def test_what_is_advised_for_bands_that_are_too_wide_holds_a_colour_under_any_light() -> None:
+    wide = NM[::9]
+    with pytest.raises(DecodeError, match=r"Reconstruct bands of 30 nm or finer from about 430 to 660 nm"):
+        colours_of({"x": (np.full(wide.size, 0.5), np.full(wide.size, 0.01))}, wide, ("D65",))
+    assert lights_for(NM[::6]) == tuple(ILLUMINANTS)
+
+
 @pytest.mark.parametrize("step", [2, 4, 6])
 def test_bands_far_apart_hold_a_colour_as_long_as_it_hardly_changes(step: int) -> None:
     std, chart = np.full(NM.size, 0.005), chart_reflectance(NM)
