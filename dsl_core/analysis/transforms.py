@@ -15,6 +15,8 @@ Given = NDArray[np.float32] | NDArray[np.float64]
 
 #: Spectra drawn for deviations without continuum; they state those within about 10 %.
 _DRAWS = 100
+#: Where a smaller share of them has a continuum, deviations are not known.
+_LEAST_SHARE = 0.9
 
 
 class Transform(Enum):
@@ -78,6 +80,10 @@ def _drawn(nm: Floats, values: Floats, std: Floats, found: Floats) -> Floats:
     root = np.linalg.cholesky(usual_correlation(nm))
     draws = values + std * (np.random.default_rng(0).standard_normal((_DRAWS, len(nm))) @ root.T)
     moves = np.stack([_continuum_removed(nm, draw) - found for draw in draws])
+    # Noise of a band at an end that is unsure takes the hull of a few draws to zero; they have no answer.
+    moves = moves[np.isfinite(moves).all(1)]
+    if len(moves) < _LEAST_SHARE * _DRAWS:
+        return np.full(len(nm), np.nan)
     return np.asarray(np.hypot(moves.std(0), moves.mean(0) / (np.sqrt(2) - 1)))
 
 

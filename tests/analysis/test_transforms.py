@@ -39,6 +39,20 @@ def test_deviations_without_the_continuum_contain_that_noise_lifts_it(shape: np.
     assert 0.91 < np.mean(covered) < 0.98
 
 
+def test_an_unsure_end_takes_no_deviations_without_the_continuum_from_the_rest() -> None:
+    spectrum, even = 0.3 + 0.1 * np.sin(NM / 40), np.full(NM.size, 0.01)
+    unsure = np.where(NM[0] == NM, 0.1, even)
+    (_, usual), (_, std) = (transformed(NM, spectrum, each, Transform.CONTINUUM) for each in (even, unsure))
+    assert usual is not None
+    assert std is not None
+    assert np.isfinite(std).all()
+    assert std[30:] == pytest.approx(usual[30:], rel=0.05, abs=1e-3)
+    assert std[1] > 3 * usual[1]
+    _, none = transformed(NM, 0.02 * spectrum, even, Transform.CONTINUUM)
+    assert none is not None
+    assert np.isnan(none).all()
+
+
 def test_a_level_leaves_a_normalised_spectrum_and_a_line_its_derivative() -> None:
     twice = transformed(NM, 2 * MEAN, 2 * STD, Transform.NORMALISED)
     once = transformed(NM, MEAN, STD, Transform.NORMALISED)
