@@ -14,8 +14,10 @@ from dsl_core.optics.spectra import chain_response
 
 Floats = NDArray[np.float64]
 
-#: Wavelengths on which integrals over a filter are taken.
+#: Wavelengths on which integrals over a filter are taken, a nanometre apart.
 FINE_NM = np.arange(390.0, 711.0)
+#: The band of a filter ends at this share of what it passes where the rig sees most light through it.
+BAND_SHARE = 0.1
 #: Deviations of a filter's c, a and b before anything is seen: any index, or no such filter; tilts of some
 #: degrees.
 ANGLE_STD = np.array([0.3, 0.03, 0.03])
@@ -71,16 +73,6 @@ def three_cavities(distance_nm: Floats, fwhm_nm: float, peak: float = 0.8) -> Fl
     return np.asarray(peak / (1 + (2 * distance_nm / fwhm_nm) ** 6))
 
 
-def passed_width_nm(transmission: SpectralCurve) -> float:
-    """Width of the rectangle as high as a transmission's peak that passes as much, nm; 0 for an opaque one.
-
-    >>> round(passed_width_nm(nominal_filter(550.0, 20.0)))
-    21
-    """
-    values = np.array(transmission.values)
-    return float(np.trapezoid(values, transmission.wavelengths_nm) / max(values.max(), 1e-9))
-
-
 def through_filter(
     transmission: SpectralCurve, shift: Floats | None = None, weight: Floats | None = None
 ) -> Floats:
@@ -103,6 +95,22 @@ def passed(
     ``shift`` and ``weight`` as of `through_filter`.
     """
     return np.asarray(chain_response(rig, 0, FINE_NM).sum(1) * through_filter(transmission, shift, weight))
+
+
+def passed_width_nm(rig: Rig, transmission: SpectralCurve) -> float:
+    """Width of the rectangle as high as a filter's band that passes as much as this does, nm.
+
+    The band is the one that the rig sees most light of, down to `BAND_SHARE` of that place on either side and
+    half as far again: filters open again in the near infrared, and measured transmissions have an offset. 0
+    for an opaque one.
+    """
+    through, most = through_filter(transmission), int(passed(rig, transmission).sum(0).argmax())
+    outside = np.flatnonzero(through <= BAND_SHARE * through[most])
+    first = int(outside[outside < most].max(initial=-1)) + 1
+    end = int(outside[outside > most].min(initial=through.size))
+    flank = (end - first) // 2
+    height = max(float(through[first:end].max()), 1e-9)
+    return float(through[max(first - flank, 0) : end + flank].sum()) / height
 
 
 def relative_shift(terms: Floats, values: Floats) -> Floats:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import (
     FINE_NM,
     nominal_filter,
@@ -15,6 +16,7 @@ from dsl_core.optics.filters import (
     relative_shift,
     shift_slopes,
     shift_terms,
+    three_cavities,
     through_filter,
 )
 from dsl_core.optics.spectra import chain_response
@@ -31,10 +33,24 @@ def test_a_nominal_filter_has_its_peak_and_half_of_it_half_a_width_away() -> Non
     assert usual.at(np.array([500.0, 495.0, 505.0])) == pytest.approx([0.8, 0.4, 0.4])
 
 
+@pytest.mark.parametrize("centre_nm", [450.0, 550.0, 640.0])
 @pytest.mark.parametrize("fwhm_nm", [10.0, 20.0, 40.0])
-def test_the_width_of_what_a_filter_passes_is_about_that_at_half_of_its_peak(fwhm_nm: float) -> None:
+def test_the_width_of_what_a_filter_passes_is_about_that_at_half_of_its_peak(
+    centre_nm: float, fwhm_nm: float
+) -> None:
     for peak in (0.3, 0.8):
-        assert passed_width_nm(nominal_filter(550.0, fwhm_nm, peak)) == pytest.approx(fwhm_nm, rel=0.06)
+        curve = nominal_filter(centre_nm, fwhm_nm, peak)
+        assert passed_width_nm(published_rig(), curve) == pytest.approx(fwhm_nm, rel=0.06)
+    assert passed_width_nm(published_rig(), nominal_filter(centre_nm, fwhm_nm, 0.0)) == 0.0
+
+
+@pytest.mark.parametrize("peak", [0.2, 0.8])
+def test_neither_the_near_infrared_nor_an_offset_makes_a_filter_broad(peak: float) -> None:
+    nm = np.arange(350.0, 1101.0)
+    narrow = three_cavities(nm - 550.0, 10.0, peak)
+    for values in (narrow + 0.9 * (nm > 690), narrow + 0.005):
+        curve = SpectralCurve.of(nm, values)
+        assert passed_width_nm(published_rig(), curve) == pytest.approx(10.0, abs=1.5)
 
 
 def test_light_through_a_filter_is_that_of_white_times_its_transmission_and_none_outside_it() -> None:

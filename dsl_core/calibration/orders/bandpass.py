@@ -126,7 +126,7 @@ def fit_bandpass(
     lights = [passed(rig, each.transmission, shift) for each in filters]
     # Orders are placed in the middle of the image.
     middle = relative_shift(shift_terms(rig, _middle(rig)), np.array(angle.values))
-    placed = [_placed(each, passed(rig, each.transmission, middle)) for each in filters]
+    placed = [_placed(rig, each, passed(rig, each.transmission, middle)) for each in filters]
     found = found_wavelengths(rig, placed)
     warnings = _check(rig, filters, placed, found)
     samples = {
@@ -198,13 +198,13 @@ def _middle(rig: Rig) -> NDArray[np.int64]:
     return np.array([rig.camera.height_px // 2 * rig.camera.width_px + rig.camera.width_px // 2])
 
 
-def _placed(each: SeenFilter, light: Floats) -> PlacedFilter:
+def _placed(rig: Rig, each: SeenFilter, light: Floats) -> PlacedFilter:
     offsets = {
         order: (each.light.orders[order].offset_px, each.light.orders[order].offset_std_px)
         for order in ORDERS
         if np.isfinite(each.light.orders[order].offset_px)
     }
-    width_nm = passed_width_nm(each.transmission)
+    width_nm = passed_width_nm(rig, each.transmission)
     return PlacedFilter(each.filter_nm, effective_nm(light), each.measured_curve, offsets, width_nm)
 
 

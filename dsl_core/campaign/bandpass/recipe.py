@@ -236,7 +236,7 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
             first_order_reach_px(rig),
             unlit_px(rig, lines.width_px),
             rig.projector.width_px,
-            widening(rig, note.filter_nm, passed_width_nm(curve)),
+            widening(rig, note.filter_nm, passed_width_nm(rig, curve)),
         )
         if light.saturated > 0.5:
             raise CalibrationError(
