@@ -25,8 +25,9 @@ FEWEST_SAMPLES, CLIPPED_SAMPLES = 16, 6
 STEEP_STEPS, MOST_DIGITS = 10.0, 6
 #: A spectrum of light may fall below zero by this share of its peak.
 NEGATIVE_SHARE = 0.1
-#: What the measured transmission of a filter may be: noise takes it a little beyond 0 and 1.
-TRANSMISSIONS = (-0.02, 1.05)
+#: What the measured transmission of a filter may be where light is used, or so near its nominal centre, nm:
+#: noise takes it a little beyond 0 and 1, and up to this percentage of it further below.
+TRANSMISSIONS, NEAR_NM, NOISIEST, NOISY_PERCENT = (-0.02, 1.05), 40.0, -0.1, 5
 #: Unit of a spectroradiometer's curves.
 RADIANCE = "W/(sr m2 nm)"
 
@@ -163,13 +164,17 @@ def require_light(curve: SpectralCurve, others: Mapping[Any, SpectralCurve], wha
 
 def require_transmission(curve: SpectralCurve, filter_nm: float) -> None:
     """Raise `DeviceError` unless a curve can be what the filter of a nominal centre passes, as a share."""
-    least, most = min(curve.values), max(curve.values)
+    # Instruments are noisy at the ends of their range, which nothing uses.
+    low_nm, high_nm = min(COVERED_NM[0], filter_nm - NEAR_NM), max(COVERED_NM[1], filter_nm + NEAR_NM)
+    values = curve.at(np.arange(low_nm, high_nm + 1))
+    least, usual, most = np.percentile(values, (0, NOISY_PERCENT, 100))
     # Written so that a figure that is no number is refused as well.
-    if not (TRANSMISSIONS[0] <= least and 0 < most <= TRANSMISSIONS[1]):
+    if not (least >= NOISIEST and TRANSMISSIONS[0] <= usual and 0 < most <= TRANSMISSIONS[1]):
+        what = "divide percent by 100" if most > TRANSMISSIONS[1] else "measure it and its dark signal again"
         raise DeviceError(
-            f"The rig says that the filter of {filter_nm:g} nm passes {least:g} to {most:g} of the light; a"
-            " share from 0 to 1 is wanted. Correct its measured transmission in the rig's driver (filters):"
-            " divide percent by 100."
+            f"The rig says that from {low_nm:g} to {high_nm:g} nm the filter of {filter_nm:g} nm passes"
+            f" {least:g} to {most:g} of the light; a share from 0 to 1 is wanted. Correct its measured"
+            f" transmission in the rig's driver (filters): {what}."
         )
 
 
