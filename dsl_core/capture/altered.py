@@ -16,7 +16,7 @@ from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
 from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.rig import Sensor, colour_sites
-from dsl_core.optics.sensor import raw_variance
+from dsl_core.optics.sensor import NEAR_FULL, raw_variance
 
 Mosaic = NDArray[np.uint16]
 #: White, black and a frame of the code of one time, raw mosaics (rows, columns), DN.
@@ -32,8 +32,8 @@ CHANGED, KEPT = 0.15, 0.05
 NO_LIGHT, FEWEST_ROWS, MOST_ROWS = 0.05, 2, 0.7
 #: Rows of which pixels work have this share of the noise of black that they had, and black but for so much.
 ALIVE, SAME_BLACK_DN = 0.6, 2.0
-#: Pictures are clipped where this share of the pixels has the largest value, below full scale, and so many
-#: times as many as the two values below it, which noise of a flat surface fills as well.
+#: Pictures are clipped where this share of the pixels has the largest value, and so many times as many as the
+#: two values below it, which noise of a flat surface fills as well.
 CLIPPED, PILED = 0.01, 2
 #: A picture alone says so with more than this share of full scale.
 BRIGHT_SHARE = 0.2
@@ -165,7 +165,7 @@ def _dark_rows(before: Pictures, now: Pictures, sensor: Sensor) -> str:
 def _clipped(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
     """Whether white ends below full scale, all of it or one colour, and did not before."""
     for words, own in _parts(now.shape, sensor):
-        found = _limit_of(now[own], sensor)
+        found = _limit_of(now[own], _highest_dn(now, sensor))
         old = before[own]
         if found is not None and float((old == old.max()).mean()) <= found[1] / 4:
             return _said_of_limit(f"white{words}", *found)
@@ -175,7 +175,7 @@ def _clipped(before: Mosaic, now: Mosaic, sensor: Sensor) -> str:
 def ends_early(picture: Mosaic, sensor: Sensor) -> str:
     """Whether the counts of a bright picture, or of a colour of it, end below full scale; empty if not."""
     for words, own in _parts(picture.shape, sensor):
-        found = _limit_of(picture[own], sensor)
+        found = _limit_of(picture[own], _highest_dn(picture, sensor))
         if found is not None and found[0] > BRIGHT_SHARE * sensor.full_scale_dn:
             return _said_of_limit(f"it{words}", *found)
     return ""
@@ -191,15 +191,21 @@ def _parts(shape: tuple[int, ...], sensor: Sensor) -> Iterator[tuple[str, NDArra
             yield f" in {name}", colour == each
 
 
-def _limit_of(counts: Mosaic, sensor: Sensor) -> tuple[int, float] | None:
-    """The value below full scale that counts pile up at, and the share of pixels that have it.
+def _highest_dn(picture: Mosaic, sensor: Sensor) -> float:
+    """Below which values counts of a picture end early, all of them or those of a colour.
 
-    Digital gain below one, as of a white balance, leaves little between it and full scale.
+    Many cameras saturate a little below full scale. A colour that ends below the others has a digital gain
+    below one, as of a white balance, which leaves little between the two.
     """
+    return max(NEAR_FULL * sensor.full_scale_dn, float(picture.max()))
+
+
+def _limit_of(counts: Mosaic, highest_dn: float) -> tuple[int, float] | None:
+    """The value below ``highest_dn`` that counts pile up at, and the share of pixels that have it."""
     values, numbers = np.unique(counts, return_counts=True)
     most, share = int(values[-1]), float(numbers[-1]) / counts.size
     is_piled_up = numbers[-1] > PILED * numbers[-3:-1].sum()
-    return (most, share) if most < sensor.full_scale_dn and share >= CLIPPED and is_piled_up else None
+    return (most, share) if most < highest_dn and share >= CLIPPED and is_piled_up else None
 
 
 def _said_of_limit(where: str, most: int, share: float) -> str:

@@ -185,6 +185,15 @@ def test_a_colour_that_a_digital_white_balance_ends_just_below_full_scale_says_s
     assert f"No pixel of it in blue has more than {most_dn} DN" in ends_early(white.astype(np.uint16), SENSOR)
 
 
+@pytest.mark.parametrize("end_dn", [4095, 4094, 4080, 3700])
+def test_a_brighter_lamp_is_not_an_end_of_a_camera_that_always_ended_below_full_scale(end_dn: int) -> None:
+    brighter = pictures(2, over_black(lambda light: 2.5 * light))
+    before, now = (tuple(np.minimum(each, end_dn) for each in taken) for taken in (pictures(1), brighter))
+    assert (now[0] == end_dn).mean() > 0.02
+    assert "saturates below" not in alteration(before, now, SENSOR)  # type: ignore[arg-type]
+    assert ends_early(now[0], SENSOR) == ""
+
+
 def test_twelve_bits_delivered_as_ten_end_early() -> None:
     white = np.minimum(8 * pictures(1)[0].astype(np.uint32), int(SENSOR.full_scale_dn)) >> 2
     assert "has more than 1023 DN" in ends_early(white.astype(np.uint16), SENSOR)
