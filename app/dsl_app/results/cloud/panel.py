@@ -64,6 +64,7 @@ class CloudPanel(QWidget):
         self._lasso: list[tuple[float, float]] = []
         self._press: tuple[float, float] | None = None
         self._measure, self._picked = Measure.NOTHING, list[Pixel]()
+        self._measured: Measured | None = None
         self._hint = label("", "muted", wraps=True, can_be_copied=True)
         # Always the height of two lines: a shorter answer does not move the tools above it.
         self._hint.setMinimumHeight(2 * self._hint.fontMetrics().lineSpacing())
@@ -99,7 +100,7 @@ class CloudPanel(QWidget):
         state.depth_limits.changed.connect(lambda _: self._limit_points())
         state.cursor.changed.connect(self._show_cursor)
         state.marks.changed.connect(lambda _: self._show_pins())
-        state.tool.follow(lambda _: self._show_hint())
+        state.tool.follow(self._take_tool)
         tools.look_chosen.connect(lambda look: None if self.view is None else self.view.take_look(look))
         tools.side_chosen.connect(lambda side: None if self.view is None else self.view.see_from(side))
         tools.share_chosen.connect(self._show_share)
@@ -155,7 +156,7 @@ class CloudPanel(QWidget):
         self.view = view
         view.apply_theme(self._theme)
         self.tools.setEnabled(can_draw)
-        self._show_hint()
+        self._show_measured(self._measured)
         self.message.hide()
         view.setMinimumHeight(LEAST_VIEW_PX)
         self._box.insertWidget(0, view, 1)
@@ -254,7 +255,9 @@ class CloudPanel(QWidget):
         self.view.show_pins(points[known], np.array(colours, np.uint8).reshape(-1, 3)[known])
 
     def _show_hint(self) -> None:
-        if self._measure is not Measure.NOTHING:
+        if self._measured is not None:
+            self._hint.setText(self._measured.text)
+        elif self._measure is not Measure.NOTHING:
             self._hint.setText(self._measure.value)
         elif self._draws:
             self._hint.setText("Draw around points with the left button.")
@@ -266,6 +269,14 @@ class CloudPanel(QWidget):
     def _start_measuring(self, kind: Measure) -> None:
         self._measure = kind
         self._begin_again()
+        # What is chosen last, lasso or measure, has the left button.
+        if kind is not Measure.NOTHING and self._state.tool.value is Tool.LASSO:
+            self._state.tool.set(Tool.PIN)
+
+    def _take_tool(self, tool: Tool) -> None:
+        if tool is Tool.LASSO:
+            self.tools.measure.choose(Measure.NOTHING)
+            self._start_measuring(Measure.NOTHING)
         self._show_hint()
 
     def _begin_again(self) -> None:
@@ -292,8 +303,8 @@ class CloudPanel(QWidget):
             self._section_plot().show_section(cut)
         if self.section is not None:
             self.section.setVisible(cut is not None)
-        if found is not None:
-            self._hint.setText(found.text)
+        self._measured = found
+        self._show_hint()
         if self.view is not None:
             self.view.show_overlay(Overlay(line=None if found is None else found.ends))
 
@@ -316,9 +327,7 @@ class CloudPanel(QWidget):
     @property
     def _draws(self) -> bool:
         """Whether the left button draws around points."""
-        if self._measure is not Measure.NOTHING:
-            return self._measure is Measure.PLANE
-        return self._state.tool.value is Tool.LASSO
+        return self._measure is Measure.PLANE or self._state.tool.value is Tool.LASSO
 
     def _mouse(self, event: QMouseEvent) -> bool:
         """Point, pin, measure or draw; True if the event must not rotate the view."""

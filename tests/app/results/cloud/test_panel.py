@@ -97,6 +97,47 @@ def test_a_measurement_does_not_go_on_in_another_result(
     assert panel._hint.text().startswith("Distance ")
 
 
+def test_lasso_and_measure_have_the_button_one_at_a_time(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _still_view(bench, qtbot, monkeypatch)
+    panel, tool = bench.page.cloud, bench.state.tool
+    panel.tools.measure.choose(Measure.SECTION)
+    panel.tools.measure_chosen.emit(Measure.SECTION)
+    panel._measure_pixel((3, 3))
+    panel._measure_pixel((30, 20))
+    tool.set(Tool.LASSO)
+    assert panel._draws
+    assert panel._hint.text() == "Draw around points with the left button."
+    assert panel.tools.measure.currentData() is Measure.NOTHING
+    assert panel.section is not None
+    assert panel.section.isHidden()
+    panel.tools.measure_chosen.emit(Measure.DISTANCE)
+    assert tool.value is Tool.PIN
+    assert not panel._draws
+    assert panel._hint.text() == Measure.DISTANCE.value
+
+
+def test_a_measured_answer_is_still_there_after_a_visit_to_another_page(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = _still_view(bench, qtbot, monkeypatch)
+    panel = bench.page.cloud
+    panel.tools.measure_chosen.emit(Measure.DISTANCE)
+    panel._measure_pixel((3, 3))
+    panel._measure_pixel((30, 20))
+    answer = panel._hint.text()
+    assert answer.startswith("Distance ")
+    bench.page.hide()
+    bench.page.show()
+    qtbot.waitUntil(view.isVisible)
+    assert panel._hint.text() == answer
+    bench.state.tool.set(Tool.RECTANGLE)
+    assert panel._hint.text() == answer
+    panel._measure_pixel((3, 3))
+    assert panel._hint.text() == Measure.DISTANCE.value
+
+
 def test_it_says_what_it_does_until_there_is_a_picture(
     bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
