@@ -59,6 +59,11 @@ class CampaignFolder:
     def open(cls, path: Path) -> Self:
         """A campaign that was begun before; raises `StoreError`."""
         if not (path / CAMPAIGN_NAME).is_file():
+            if not path.exists():
+                raise StoreError(
+                    f"{path} is not a campaign: there is no such folder. Connect its drive if it is on one,"
+                    " or give the folder of a campaign."
+                )
             if is_lost_campaign(path):
                 raise StoreError(
                     f"{path} holds the captures of a campaign, but no {CAMPAIGN_NAME}. Begin a campaign of"
@@ -147,10 +152,12 @@ class CampaignFolder:
     def accept(self, name: str) -> AcceptedCalibration:
         """Accept the candidate; the one it replaces goes into the history.
 
-        Raises `StoreError` when there is none.
+        Raises `StoreError` when there is none, or the campaign is gone.
         """
         candidate = self.candidate(name)
         if candidate is None:
+            # A folder that is gone has no fit either.
+            self.open(self.path)
             raise StoreError(f"There is no fit of {name} in {self.path} to be accepted. Fit it first.")
         old = self.accepted(name)
         if old is not None:

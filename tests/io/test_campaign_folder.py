@@ -131,6 +131,12 @@ def test_a_damaged_file_names_its_first_wrong_field(campaign: CampaignFolder) ->
         read_record(campaign.path, CampaignInfo)
 
 
+def test_a_fit_in_a_folder_that_is_gone_is_not_said_to_be_missing(campaign: CampaignFolder) -> None:
+    campaign.path.rename(campaign.path.with_name("moved"))
+    with pytest.raises(StoreError, match="there is no such folder"):
+        campaign.accept("geometry")
+
+
 def test_whoever_takes_a_campaign_clears_what_a_killed_writer_left(tmp_path: Path) -> None:
     step = tmp_path / "geometry" / "pose-1"
     step.mkdir(parents=True)

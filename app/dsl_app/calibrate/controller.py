@@ -116,7 +116,11 @@ class CalibrateController:
             if self.state.campaign.value == facts:
                 self.state.rows.set(rows)
 
-        self._runner.submit(Job("Read the campaign", work, done, is_minor=True))
+        def failed(error: Exception) -> None:
+            if self.state.campaign.value == facts:
+                self.state.trouble.set(sentence_of(error))
+
+        self._runner.submit(Job("Read the campaign", work, done, failed, is_minor=True))
 
     def _fits(self, facts: CampaignFacts) -> bool:
         choice = self._rig.state.choice.value
@@ -281,6 +285,7 @@ class CalibrateController:
             )
             return False
         try:
+            CampaignFolder.open(path)
             self._lock.callback(take_campaign(path).release)
         except DslError as error:
             self._notifier.tell("error", str(error))

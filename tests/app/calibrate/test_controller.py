@@ -89,6 +89,18 @@ def test_a_lost_rig_calibrates_nothing_until_it_is_connected_again(bench: Calibr
     assert bench.state.trouble.value == ""
 
 
+def test_a_campaign_whose_folder_is_gone_is_said_to_be(bench: CalibrateBench) -> None:
+    bench.campaign.rename(bench.folder / "moved")
+    bench.control.refresh()
+    gone = f"{bench.campaign} is not a campaign: there is no such folder."
+    assert bench.state.trouble.value.startswith(gone)
+    bench.control.run("selftest")
+    assert bench.told.startswith(gone)
+    (bench.folder / "moved").rename(bench.campaign)
+    bench.control.refresh()
+    assert bench.state.trouble.value == ""
+
+
 def test_the_command_line_names_campaign_and_rig(bench: CalibrateBench) -> None:
     where = f"{bench.campaign} --rig twin --option scene=plane --option size=32x24"
     assert bench.control.command_line("geometry") == f"dsl-scan calibrate geometry {where}"
