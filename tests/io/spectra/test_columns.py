@@ -14,6 +14,8 @@ from dsl_core.io.spectra.units import quantity_of
 
 NM = np.arange(400, 701, 10)
 LEAF = 0.2 + 0.1 * np.sin(NM / 50)
+#: Titles of columns that are neither spectra nor wavelengths.
+_ASIDE = ("std", "Wavelength error")
 
 
 def table(path: Path, titles: str, *columns: np.ndarray) -> Path:
@@ -339,3 +341,31 @@ def test_a_letter_over_another_column_is_no_unit_of_wavelengths(tmp_path: Path) 
     nm = np.linspace(350, 2500, 44)
     path = table(tmp_path / "some.csv", "Wavelength,Leaf (A),Leaf (B)", nm, nm / 5000, nm / 6000)
     assert read_columns(path)[0].nm[-1] == 2500
+
+
+@pytest.mark.parametrize(
+    "titles",
+    [
+        "Wavelength (nm),%R,Wavelength (nm),%R",
+        "nm,%R,nm,%R",
+        "Wavelength a,a (%),λ of b,b (%)",
+        "Wavelength,R(λ) [%],wave (nm),wave,R(λ) [%]",
+        "Wavelength,R [%],std,Wavelength,Wavelength error,R [%]",
+    ],
+)
+@pytest.mark.parametrize("others", [NM + 100, NM[::-1], 400 + NM / 10])
+def test_values_are_over_the_nearest_wavelengths_before_them(
+    tmp_path: Path, titles: str, others: np.ndarray
+) -> None:
+    columns, nm, values = [], NM, LEAF * 100
+    for title in titles.split(","):
+        if columns and "%" not in title and title != "std":
+            nm, values = others, LEAF * 50
+        columns.append(values if "%" in title else values * 0 + 0.1 if title in _ASIDE else nm)
+    found = read_columns(table(tmp_path / "pairs.csv", titles, *columns))
+    assert len(found) == 2
+    np.testing.assert_allclose(found[0].nm, NM)
+    np.testing.assert_allclose(found[0].values, LEAF, rtol=1e-4)
+    step = 1 if others[1] > others[0] else -1
+    np.testing.assert_allclose(found[1].nm, others[::step])
+    np.testing.assert_allclose(found[1].values, LEAF[::step] / 2, rtol=1e-4)

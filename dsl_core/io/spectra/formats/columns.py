@@ -24,7 +24,7 @@ from dsl_core.io.spectra.units import (
 #: Corrects what a format knows better than its titles say: column's title to quantity.
 Known = Callable[[str], Quantity | None]
 _WAVELENGTH = re.compile(
-    r"wave ?l|wvl|\bwl\b|\bwave\b|wellenl|lambda|λ|^\W?(?:nm|um|µm|μm)\W?$", re.IGNORECASE
+    r"wave ?l|wvl|\bwl\b|\bwave\b|wellenl|(?<![a-zA-Zρ(])(?:lambda|λ)|^\W?(?:nm|um|µm|μm)\W?$", re.IGNORECASE
 )
 #: Lines in which the wavelengths of a table of lines are looked for.
 MOST_HEADER = 300
@@ -49,29 +49,50 @@ def read_columns(path: Path) -> list[Spectrum]:
 
 
 def spectra_of(path: Path, table: Table, known: Known | None = None) -> list[Spectrum]:
-    """The spectra of a table with wavelengths in one of its columns; raises `CalibrationError`."""
-    titles, names = table.titles, table.names
-    columns = list(range(table.cells.shape[1]))
+    """The spectra of a table with wavelengths in one column or in several; raises `CalibrationError`.
+
+    The values of a column belong to the nearest wavelengths before it.
+    """
+    titles = table.titles
+    columns = [i for i in range(len(titles)) if np.isfinite(table.cells[:, i]).any()]
     if len(columns) > 2:
         columns = [i for i in columns if not counts_rows(titles[i], table.cells[:, i])] or columns
-    first = next((i for i in columns if _WAVELENGTH.search(titles[i])), columns[0])
-    given = table.cells[:, first]
+    axes = [i for i in columns if _is_axis(titles[i])] or columns[:1]
+    values_of = [i for i in columns if i not in axes and not is_beside(titles[i])]
+    shown = {titles[i]: table.cells[:, i] for i in values_of}
+    values_of = [i for i in values_of if not is_sign_beside(titles[i], shown)]
+    # Of wavelengths in several units side by side, the first ones count.
+    firsts = [i for i in axes if i - 1 not in axes]
+    spectra = []
+    for first, following in zip(firsts, [*firsts[1:], len(titles)], strict=True):
+        # What is before all wavelengths belongs to the first ones.
+        own = [i for i in values_of if i < following and (i > first or first == firsts[0])]
+        # What the whole header says is of one column only where it is the only one.
+        spectra += _over_axis(path, table, first, own, "" if len(values_of) > 1 else table.above, known)
+    return spectra
+
+
+def _is_axis(title: str) -> bool:
+    """Whether a title is of wavelengths, and not of their deviations."""
+    return bool(_WAVELENGTH.search(title)) and not is_beside(_WAVELENGTH.sub("", title))
+
+
+def _over_axis(
+    path: Path, table: Table, first: int, own: Sequence[int], above: str, known: Known | None
+) -> list[Spectrum]:
+    """The spectra in the columns ``own`` over the wavelengths in column ``first``."""
+    titles, given = table.titles, table.cells[:, first]
     kept = np.isfinite(given)
-    if np.count_nonzero(kept) < MIN_ROWS:
+    if not own or np.count_nonzero(kept) < MIN_ROWS:
         return []
     _require_no_lines(path, titles, titles[first], given[kept])
     nm = to_nanometres(path, given[kept], titles[first], table.header)
-    values_of = [i for i in columns if i != first and not is_beside(titles[i])]
-    shown = {titles[i]: table.cells[:, i] for i in values_of}
-    values_of = [i for i in values_of if not is_sign_beside(titles[i], shown)]
     spectra = []
-    for i in values_of:
+    for i in own:
         values = table.cells[kept, i]
         if np.isfinite(values).any():
-            # What the whole header says is of one column only where it is the only one.
-            around = "" if len(values_of) > 1 else table.above
-            around = around if titles[i] else table.header
-            spectra.append(_spectrum(path, names[i], titles[i], around, nm, values, known))
+            around = above if titles[i] else table.header
+            spectra.append(_spectrum(path, table.names[i], titles[i], around, nm, values, known))
     return spectra
 
 
