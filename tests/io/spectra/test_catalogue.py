@@ -201,6 +201,11 @@ def test_several_spectra_are_listed_by_name(tmp_path: Path) -> None:
         ("a.sed", made.sed()[:200], "no spectrum behind its line 'Data:'"),
         ("a.txt", made.ocean("Data from USB2000 Node", 9000), "contains counts"),
         ("a.txt", made.ocean().replace("Wavelengths", "Raman Shifts"), "not over wavelength"),
+        (
+            "a.txt",
+            made.ocean().replace("XAXIS mode: Wavelengths", "XAxis mode: Raman Shift"),
+            "not over wave",
+        ),
         ("a.txt", made.avantes("Scope", "[counts]"), "contains counts"),
         ("a.txt", made.avantes("Irradiance", "[µWatt/cm²/nm]"), "contains counts and irradiance"),
         (

@@ -27,7 +27,7 @@ def is_ocean(path: Path, head: bytes) -> bool:
 def read_ocean(path: Path) -> list[Spectrum]:
     """The spectrum; counts where nothing says what else it is. Raises `CalibrationError`."""
     header, data = _BEGIN.split(decoded(content_of(path)), maxsplit=1)
-    if re.search(r"XAXIS mode\s*:\s*(?!Wavelengths)\S", header):
+    if re.search(r"(?i)x-?axis mode\s*:\s*(?!wavelength)\S", header):
         raise CalibrationError(
             f"{path.name} is not over wavelength. Choose wavelengths (nm) for the axis and export again."
         )
