@@ -17,6 +17,10 @@ from dsl_core.io.spectra.records import MOST_NUMBER, Floats
 MIN_ROWS = 8
 #: More cells are no spectra; they would fill the memory.
 MOST_CELLS = 20_000_000
+#: Rows that go on behind a remark do so within so many steps; farther on, another table begins.
+MOST_GAP = 50
+#: Empty lines and remarks, which may stand between rows.
+_BETWEEN = re.compile(r"\W*|\s*(?:[#!%*]|//).*")
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)\b", re.IGNORECASE)
 #: What programs write where there is no value.
 _MISSING = re.compile(r"[-+]?nan|n/?a|n\. ?a\.?|#n/a|null|[-–—]+", re.IGNORECASE)
@@ -108,28 +112,59 @@ def tables_of(path: Path, text: str) -> list[Table]:
     rows: list[list[str]] = []
     numbers: list[int] = []
     sources: list[str] = []
+    between: list[str] = []
 
     def end() -> None:
-        nonlocal header, rows, numbers, sources
+        nonlocal header, rows, numbers, sources, between
         if len(rows) >= MIN_ROWS:
             tables.append(_table(path, header, rows, numbers, sources[0]))
-            header = []
+            header = between
         else:
-            header += sources
-        rows, numbers, sources = [], [], []
+            header += sources + between
+        rows, numbers, sources, between = [], [], [], []
 
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in _lines(text):
         cells = cells_of(line)
-        is_missing = bool(rows) and len(cells) == 1 and line.strip(" \r\n")[-1:] in (";", "\t", ",", "|")
-        if is_row(cells) or (is_missing and _NUMBER.fullmatch(cells[0])):
+        leading = _leading(cells)
+        is_missing = (
+            bool(rows) and len(cells) == leading + 1 and line.strip(" \r\n")[-1:] in (";", "\t", ",", "|")
+        )
+        if is_row(cells[leading:]) or (is_missing and _NUMBER.fullmatch(cells[-1])):
+            # Numbers over the columns of values are titles, with nothing over the wavelengths.
+            if (between and not _goes_on(rows, cells)) or (len(rows) == 1 and leading < _leading(rows[0])):
+                end()
+            between = []
             rows.append(cells)
             numbers.append(number)
             sources.append(line)
+        elif rows and _BETWEEN.fullmatch(line):
+            between.append(line)
         else:
             end()
             header.append(line)
     end()
     return tables
+
+
+def _lines(text: str) -> list[tuple[int, str]]:
+    """The lines with their numbers, without empty ones where these stand between all others."""
+    lines = list(enumerate(text.rstrip().splitlines(), 1))
+    given = [(number, line) for number, line in lines if line.strip()]
+    return given if 3 * len(given) < 2 * len(lines) else lines
+
+
+def _leading(cells: list[str]) -> int:
+    """How many cells before the first one with anything in it are empty."""
+    return next((i for i, cell in enumerate(cells) if cell), 0)
+
+
+def _goes_on(rows: list[list[str]], cells: list[str]) -> bool:
+    """Whether a row behind a remark belongs to the rows before it: its wavelength goes on as theirs do."""
+    last = [*rows[-2:], cells]
+    if len({len(row) for row in last}) > 1 or len(last) < 3:
+        return False
+    step, gap = np.diff([number_of(row[_leading(row)]) for row in last])
+    return bool(0 < gap * step <= MOST_GAP * step**2)
 
 
 def is_row(cells: list[str]) -> bool:

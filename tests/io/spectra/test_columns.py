@@ -369,3 +369,63 @@ def test_values_are_over_the_nearest_wavelengths_before_them(
     step = 1 if others[1] > others[0] else -1
     np.testing.assert_allclose(found[1].nm, others[::step])
     np.testing.assert_allclose(found[1].values, LEAF[::step] / 2, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("at", "between"),
+    [
+        (25, "# filter change\n"),
+        (25, "\n"),
+        (3, "// 2nd grating\n\n"),
+        (12, ",,\n"),
+        (None, "\n"),
+        (None, "\r\n"),
+    ],
+)
+@pytest.mark.parametrize("falls", [False, True])
+def test_rows_behind_a_remark_or_an_empty_line_are_read(
+    tmp_path: Path, at: int | None, between: str, falls: bool
+) -> None:
+    step = -1 if falls else 1
+    given = zip(NM[::step], LEAF[::step], strict=True)
+    rows = [f"{nm},{r:.5f}\n" + (between if at in (None, i) else "") for i, (nm, r) in enumerate(given)]
+    path = tmp_path / "leaf.csv"
+    path.write_bytes("".join(["nm,R\n", *rows]).encode())
+    (leaf,) = read_columns(path)
+    assert (leaf.name, leaf.nm.tolist()) == ("R", NM.tolist())
+    np.testing.assert_allclose(leaf.values, LEAF, atol=1e-5)
+
+
+def test_rows_that_begin_again_or_are_far_away_are_no_part_of_a_table(tmp_path: Path) -> None:
+    path = table(tmp_path / "two.csv", "1,2\n3,4\n\nnm,R", NM, LEAF)
+    rows = [f"{nm},{r / 2:.5f}" for nm, r in zip(NM, LEAF, strict=True)]
+    path.write_text("\n".join([path.read_text(), "", *rows, "", "5000,1", *[""] * 99]))
+    first, second = read_columns(path)
+    assert first.nm.tolist() == second.nm.tolist() == NM.tolist()
+    np.testing.assert_allclose(second.values, LEAF / 2, atol=1e-5)
+
+
+@pytest.mark.parametrize("before", [",", ",,", "\t"])
+@pytest.mark.parametrize("titles", ["Wavelength (nm){}%R", "nm{}R (%)"])
+def test_empty_columns_before_the_wavelengths_are_passed_over(
+    tmp_path: Path, before: str, titles: str
+) -> None:
+    between = before[0]
+    rows = [f"{before}{nm}{between}{100 * r:.5f}{between}" for nm, r in zip(NM, LEAF, strict=True)]
+    path = tmp_path / "filter.csv"
+    path.write_text("\n".join(['"FL532"' + between * 4, before + titles.format(between), *rows]))
+    (found,) = read_columns(path)
+    assert found.nm.tolist() == NM.tolist()
+    np.testing.assert_allclose(found.values, LEAF, atol=1e-6)
+
+
+def test_of_pairs_the_first_may_be_the_shorter_one(tmp_path: Path) -> None:
+    rows = [
+        f"{nm},{r:.5f},{nm},{r / 2:.5f}" if nm < 600 else f",,{nm},{r / 2:.5f}"
+        for nm, r in zip(NM, LEAF, strict=True)
+    ]
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join(["nm,a,nm,b", *rows]))
+    short, full = read_columns(path)
+    assert short.nm.tolist() == NM[NM < 600].tolist()
+    np.testing.assert_allclose(full.values, LEAF / 2, atol=1e-5)
