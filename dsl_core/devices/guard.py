@@ -38,8 +38,6 @@ _log = logging.getLogger(__name__)
 T = TypeVar("T")
 #: Longest text of a driver's error that is quoted.
 _QUOTED = 200
-#: A camera without black level shows, at some time and place, less than this share of its full range.
-_NEAR_ZERO = 0.005
 
 
 class _HangsError(DeviceError):
@@ -206,8 +204,8 @@ class _Camera(_Guard, Camera):
         self._had_zero = False
         #: Which rows had counts in all their pixels at some time, and which had none in the last picture.
         self._filled, self._empty = np.zeros((2, self._info.height_px), bool)
-        #: The lowest count so far in rows that are not empty.
-        self._lowest_dn = 2**self._info.bit_depth - 1
+        #: Whether a row with counts had a pixel without any, as light that falls off to nothing leaves some.
+        self._had_dark = False
 
     @property
     def info(self) -> CameraInfo:
@@ -243,16 +241,15 @@ class _Camera(_Guard, Camera):
     def _require_whole(self, pixels: NDArray[np.uint16]) -> None:
         """Raise `DeviceError` for rows that are missing: not for dark ones of a camera without black level.
 
-        Rows that are dark again, and never were anything else, are where no light comes from; a black level
-        would show in dark places of all others.
+        Rows that are dark again, and never were anything else, are where no light comes from, if dark places
+        of others had no count either: there a black level would show.
         """
         empty = pixels.max(axis=1) == 0
-        self._lowest_dn = int(pixels[~empty].min(initial=self._lowest_dn))
-        is_dark = np.array_equal(empty, self._empty) and not (empty & self._filled).any()
-        is_dark &= self._lowest_dn < _NEAR_ZERO * 2**self._info.bit_depth
+        self._had_dark |= not pixels[~empty].all()
+        is_again = np.array_equal(empty, self._empty) and not (empty & self._filled).any()
         self._empty = empty
         self._filled |= pixels.min(axis=1) > 0
-        if not (self._had_zero or is_dark):
+        if not (self._had_zero or (is_again and self._had_dark)):
             require_whole(pixels, self._name)
         self._had_zero |= not pixels[0].all()
 

@@ -310,6 +310,7 @@ def test_rows_that_are_empty_again_are_dark_unless_they_had_counts(lab: _Lab, ri
 
     with pytest.raises(DeviceError, match="1 of 4 rows empty"):
         snap(void)
+    snap(void * (np.arange(24).reshape(4, 6) != 8))
     snap(void)
     snap(void + (void > 0))
     for _ in range(3):
@@ -317,12 +318,13 @@ def test_rows_that_are_empty_again_are_dark_unless_they_had_counts(lab: _Lab, ri
             snap(cut)
 
 
+@pytest.mark.parametrize("black_dn", [1, 2, 16, 64])
 def test_rows_that_are_always_empty_are_cut_off_where_others_have_a_black_level(
-    lab: _Lab, rig: DeviceRig
+    lab: _Lab, rig: DeviceRig, black_dn: int
 ) -> None:
     rig.camera.configure(10.0)
     for light_dn in (0, 0, 900, 5):
-        pixels = np.repeat([[64 + light_dn], [64], [0], [0]], 6, 1).astype(np.uint16)
+        pixels = np.repeat([[black_dn + light_dn], [black_dn], [0], [0]], 6, 1).astype(np.uint16)
         lab.act["snap"] = partial(replace, FRAME, pixels=pixels)
         with pytest.raises(DeviceError, match="2 of 4 rows empty"):
             rig.camera.snap()
