@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from dsl_app.compare.pair.state import Pair, PairQuantity, PairState, Side
+from dsl_app.compare.refusals import CHANGED, REPLACED
 from dsl_app.compare.replaced import result_stamp, was_replaced
 from dsl_app.shared.evented import Value
 from dsl_app.shared.jobs.base import Job, JobRunner
@@ -199,18 +200,10 @@ class PairController:
             )
             return
         if asked is not None and asked is not pair:
-            self._notifier.tell(
-                "warning",
-                "The results have changed while you chose a file. Look at the new figures, then write the"
-                " report.",
-            )
+            self._notifier.tell("warning", CHANGED)
             return
         if self.read_again():
-            self._notifier.tell(
-                "warning",
-                "A result was replaced after it had been compared, and is read again. Look at the new"
-                " figures, then write the report.",
-            )
+            self._notifier.tell("warning", REPLACED)
             return
         first, truth = pair.first, pair.second.truth
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dsl_app.compare.refusals import CHANGED, REPLACED
 from dsl_app.compare.replaced import Stamp, result_stamp, was_replaced
 from dsl_app.compare.series.state import SeriesKind, SeriesRow, SeriesState
 from dsl_app.shared.jobs.base import Job, JobRunner
@@ -58,10 +59,12 @@ class SeriesController:
         else:
             self._set_rows((*rows, *new))
 
-    def read_again(self) -> None:
-        """Read results again that were replaced after they had been read."""
-        if any(map(_is_old, self.state.rows.value)) or self._has_old_reference:
+    def read_again(self) -> bool:
+        """Read results again that were replaced after they had been read; whether there are any."""
+        has_old = any(map(_is_old, self.state.rows.value)) or self._has_old_reference
+        if has_old:
             self._set_rows(self.state.rows.value)
+        return has_old
 
     def restore(
         self, rows: Sequence[tuple[Path, float | None]], against: Path | None, region: Region | None
@@ -264,14 +267,25 @@ class SeriesController:
 
     # Report ----------------------------------------------------------------------------------------
 
-    def write_report(self, target: Path) -> None:
-        """Write the series as an HTML page."""
+    def write_report(
+        self, target: Path, asked: tuple[SeriesKind, tuple[SeriesRow, ...]] | None = None
+    ) -> None:
+        """Write the series as an HTML page.
+
+        Nothing is written if the series is no longer the one that was ``asked`` for (`SeriesState.reported`).
+        """
         state = self.state
-        counted, test, kind = state.counted, state.test.value, state.kind.value
+        (kind, counted), test = state.reported, state.test.value
+        if asked is not None and asked != state.reported:
+            self._notifier.tell("warning", CHANGED)
+            return
         if state.advice.value or not counted or state.busy.value:
             self._notifier.tell(
                 "info", state.advice.value or "Add results first, and wait until they have been read."
             )
+            return
+        if self.read_again():
+            self._notifier.tell("warning", REPLACED)
             return
         names = [row.name for row in counted]
         targets = [row.target for row in counted if row.target is not None]

@@ -87,13 +87,13 @@ class SeriesPanel(QWidget):
             self._control.remove(self._state.selected.value)
 
     def _choose_report(self) -> None:
-        rows = self._state.rows.value
+        rows, asked = self._state.rows.value, self._state.reported
         if not rows:
             return
         start = rows[0].path.parent / "series.html"
         path = ask_place(self, "Write the report", str(start), "Web page (*.html)")
         if path is not None:
-            self._control.write_report(path)
+            self._control.write_report(path, asked)
 
     def _show(self) -> None:
         display = series_display(self._state)

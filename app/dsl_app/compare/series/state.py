@@ -100,6 +100,11 @@ class SeriesState:
         return tuple(row for row in self.rows.value if row.counts(self.kind.value))
 
     @property
+    def reported(self) -> tuple[SeriesKind, tuple[SeriesRow, ...]]:
+        """What a report would be of; another one as soon as any of its figures may be."""
+        return self.kind.value, self.counted
+
+    @property
     def points(self) -> tuple[SweepPoint, ...]:
         """Points of the sweep."""
         return tuple(row.point for row in self.rows.value if row.point is not None)

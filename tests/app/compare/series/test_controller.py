@@ -74,6 +74,23 @@ def test_too_few_positions_are_said(series: SeriesController, stage: list[Path])
     assert "There is no result" in told(series)
 
 
+def test_a_report_is_of_the_figures_that_were_seen(series: SeriesController, tmp_path: Path) -> None:
+    paths = [write_stage(tmp_path, position, seed=i) for i, position in enumerate(POSITIONS)]
+    target = tmp_path / "series.html"
+    series.add(paths)
+    asked = series.state.reported
+    series.set_position(paths[1], 730.0)
+    series.write_report(target, asked)
+    assert "have changed while you chose a file" in told(series)
+    asked = series.state.reported
+    save_result(build_result(flat_arrays(725.0, 0.4), NM, {}), paths[1], overwrite=True)
+    series.write_report(target, asked)
+    assert "was replaced" in told(series)
+    assert not target.exists()
+    series.write_report(target, series.state.reported)
+    assert target.exists()
+
+
 def test_positions_are_typed_and_rows_removed_and_both_come_back(
     series: SeriesController, undo: UndoStack, stage: list[Path]
 ) -> None:

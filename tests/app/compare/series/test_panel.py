@@ -18,6 +18,7 @@ from pytestqt.qtbot import QtBot
 from tests.app.support.compare_page import POSITIONS, Bench
 from tests.app.support.compare_page import bench as bench
 from tests.app.support.compare_page import stage as stage
+from tests.app.support.doubles import RecordingNotifier
 from tests.cases.stage_series import write_stage, write_sweep
 
 
@@ -133,6 +134,23 @@ def test_the_rectangle_on_the_picture_is_all_that_counts(
     QTest.mouseClick(panel.picture.content.part, Qt.MouseButton.LeftButton)
     assert not panel.picture.content.part.isChecked()
     qtbot.waitUntil(lambda: not bench.state.busy.value, timeout=30_000)
+
+
+def test_a_series_that_changes_below_the_file_dialog_is_not_reported(
+    qtbot: QtBot, bench: Bench, stage: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    panel = filled(qtbot, bench, stage)
+
+    def ask(*_: object) -> tuple[str, str]:
+        bench.page._series_control.set_position(stage[1], 730.0)
+        return str(tmp_path / "series.html"), ""
+
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", ask)
+    QTest.mouseClick(panel.report, Qt.MouseButton.LeftButton)
+    notifier = bench.page._series_control._notifier
+    assert isinstance(notifier, RecordingNotifier)
+    assert "have changed while you chose a file" in notifier.told[-1][1]
+    assert not (tmp_path / "series.html").exists()
 
 
 @pytest.mark.slow
