@@ -22,6 +22,8 @@ class CalibrationInUse:
         self._settings, self._notifier, self._save = settings, notifier, save
         self._library: CalibrateState | None = None
         self._scans: ScanController | None = None
+        #: The calibration in use of which was told that the library has lost it.
+        self._lost = ""
 
     def serve_library(self, state: CalibrateState) -> None:
         """Let scans use what is chosen on the Calibrate page."""
@@ -47,12 +49,17 @@ class CalibrationInUse:
         from dsl_app.scan.state import CalibrationChoice
         from dsl_core.io.calibration_library import CalibrationLibrary
 
+        used, gone = scans.state.calibration.value, f"The library no longer has the calibration {key!r}."
         if key.partition("@")[0] in CalibrationLibrary().names():
+            self._lost = ""
             scans.plans.choose_calibration(CalibrationChoice(key, key))
-        elif key != scans.state.calibration.value.key:
-            used = scans.state.calibration.value.in_use
-            self._notifier.tell("warning", f"The library no longer has the calibration {key!r}. {used}")
-            self._chosen(scans.state.calibration.value.key)
+        elif key != used.key:
+            self._notifier.tell("warning", f"{gone} {used.in_use}")
+            self._chosen(used.key)
+        elif key != self._lost:
+            self._lost = key
+            still = "Scans use it until you choose another one or close the window."
+            self._notifier.tell("warning", f"{gone} {still}")
 
     def _chosen(self, key: str) -> None:
         """Remember what was chosen on the Scan page."""

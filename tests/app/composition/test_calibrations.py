@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -149,6 +150,28 @@ def test_a_calibration_that_is_gone_is_forgotten_and_told_once(qtbot: QtBot, win
     assert window.parts.settings.calibration == ""
     (toast,) = window.toasts.shown
     assert "no longer has the calibration 'gone'. Scans use the calibration of the rig itself" in toast.text
+
+
+def test_a_calibration_in_use_that_leaves_the_library_is_told_once(qtbot: QtBot, window: MainWindow) -> None:
+    library = CalibrationLibrary()
+    for name in ("room 12", "other"):
+        library.store(name, published_rig())
+    scan, calibrate = window.open_page("scan"), window.open_page("calibrate")
+    assert isinstance(scan, ScanPage)
+    assert isinstance(calibrate, CalibratePage)
+    idle(qtbot, window)
+    calibrate._state.in_use.set("room 12")
+    qtbot.waitUntil(lambda: scan._state.calibration.value.key == "room 12", timeout=60_000)
+    idle(qtbot, window)
+    for name in ("room 12", "other"):
+        shutil.rmtree(library.home / name)
+        window.open_page("scan")
+        window.open_page("calibrate")
+        idle(qtbot, window)
+    assert calibrate._state.library.value == ()
+    assert scan._state.calibration.value.key == "room 12"
+    (toast,) = window.toasts.shown
+    assert "no longer has the calibration 'room 12'. Scans use it until you choose another" in toast.text
 
 
 def test_a_calibration_that_cannot_be_read_is_in_use_nowhere(qtbot: QtBot, window: MainWindow) -> None:
