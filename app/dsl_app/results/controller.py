@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dsl_app.results.answers.controller import AnswersController
 from dsl_app.results.contrast.controller import ContrastController
 from dsl_app.results.export.controller import ExportController
+from dsl_app.results.layers import within
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.search.controller import SearchController
 from dsl_app.results.state import DAYLIGHT, NEED_SPECTRA, Limits, ResultsState, ResultView
@@ -286,16 +287,25 @@ class ResultsController:
         value, before = self.state.depth_limits, self.state.depth_limits.value
         if limits == before:
             return
-        if limits is not None and not limits[0] < limits[1]:
-            self._notifier.tell(
-                "info",
-                f"There are no depths between {limits[0]:g} and {limits[1]:g} mm. Make the second limit the"
-                " larger one.",
-            )
+        if limits is not None and (why := self._leaves_nothing(limits)):
+            gone = f"There are no depths between {limits[0]:g} and {limits[1]:g} mm."
+            self._notifier.tell("info", f"{gone} {why}")
             return
         text = "showing all depths" if limits is None else "limiting depth"
         change = Change(text, partial(value.set, limits), partial(value.set, before), owner=self.state)
         self._undo.push(change)
+
+    def _leaves_nothing(self, limits: Limits) -> str:
+        """What to do about limits that leave no depth; empty where they leave one."""
+        if not limits[0] < limits[1]:
+            return "Make the second limit the larger one."
+        result = self.state.result.value
+        if result is None or within(result["depth_mm"], limits).any():
+            return ""
+        known = result["depth_mm"][within(result["depth_mm"], None)]
+        if not known.size:
+            return "The result has none at all."
+        return f"Those of the result go from {known.min():.5g} to {known.max():.5g} mm."
 
     def relight(self, light: str, adapted: bool) -> None:
         """Show the colours under another light; after several quick requests, under the last."""

@@ -140,6 +140,8 @@ def test_limits_of_depth_are_set_refused_taken_back_and_forgotten(bench: Bench, 
     bench.control.limit_depth((705.0, 710.0))
     bench.control.limit_depth((710.0, 705.0))
     assert "no depths between 710 and 705 mm" in bench.told
+    bench.control.limit_depth((1.0, 2.0))
+    assert "no depths between 1 and 2 mm. Those of the result go from 700 to " in bench.told
     bench.control.limit_depth(None)
     bench.undo.undo()
     bench.undo.undo()

@@ -208,7 +208,7 @@ def test_the_cloud_hides_what_lies_outside_the_limits_and_keeps_its_view(bench: 
     qtbot.waitUntil(lambda: view.renderer.shown == 24 * 11)
     qtbot.waitUntil(lambda: view.renderer.is_at_rest)
     np.testing.assert_allclose(view.projection()[:2, 0], before[:2])
-    bench.control.limit_depth((1.0, 2.0))
+    bench.state.depth_limits.set((1.0, 2.0))
     qtbot.waitUntil(lambda: view.renderer.shown == 0)
     bench.control.limit_depth(None)
     qtbot.waitUntil(lambda: view.renderer.shown == 24 * 36 - 1)
