@@ -22,12 +22,13 @@ from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import RESULT_NAME, Kind, kind_of
 from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.paths import is_file
+from dsl_app.shared.replaced import read_stamped, was_replaced
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import DslError
 from dsl_core.io.neighbours import beside_result, result_beside
 from dsl_core.io.result.completed import completed
-from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
+from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.result_sink import Maps
 from dsl_core.optics.levels import rgba_of_colours
 from dsl_core.progress import Progress
@@ -111,7 +112,7 @@ class ResultsController:
             # Pictures of other programs have no frames of spectral patterns.
             options = Options(spectra=not is_import(ScanReader(session)))
             made = reconstruct_to(target, session, None, options, progress, seen_geometry=see)
-            return load_arrays(made, progress)
+            return read_stamped(made, progress)
 
         def see(maps: Maps) -> None:
             self._found_first = completed(ResultArrays(target, np.empty(0), maps))
@@ -123,7 +124,7 @@ class ResultsController:
         self.state.offer.set(None)
 
     def _load(self, path: Path) -> None:
-        self._start(f"Open {path.name}", lambda progress: load_arrays(path, progress), is_minor=True)
+        self._start(f"Open {path.name}", lambda progress: read_stamped(path, progress), is_minor=True)
 
     def _start(self, title: str, work: Callable[[Progress], ResultArrays], is_minor: bool = False) -> None:
         if self.state.busy.value:
@@ -230,10 +231,25 @@ class ResultsController:
         return ExportController(result, self.state, self._runner, self._notifier)
 
     def shown_result(self) -> ResultArrays | None:
-        """The result that something is to be done with; says so where an offer hides it."""
+        """The result that something is to be done with; says so where that is hidden or replaced."""
         if why := self.state.hidden:
             self._notifier.tell("info", why)
-        return None if why else self.state.saved_result
+        return None if why or self.read_again() else self.state.saved_result
+
+    def read_again(self) -> bool:
+        """Read the open result again where another one took its place on disk; whether one did."""
+        result = self.state.saved_result
+        if result is None or not was_replaced(result.path, result.stamp):
+            return False
+        # What runs now opens or makes a result: the next visit finds the same.
+        if not self.state.busy.value:
+            self._notifier.tell(
+                "warning",
+                f"{result.path.name} was replaced after it had been opened, and is read again. Look at it,"
+                " then go on.",
+            )
+            self._load(result.path)
+        return True
 
     def command_line(self) -> str:
         """The command that reconstructs the offered scan or exports the open result."""
@@ -347,7 +363,7 @@ class ResultsController:
     def inspect(self) -> None:
         """Show what the pixel under the cursor received in each frame; needs the scan next to the result."""
         result, pixel, block = self.shown_result(), self.state.cursor.value, self._block
-        if self.state.hidden:
+        if result is None and self.state.saved_result is not None:
             return
         if result is None or pixel is None:
             self._notifier.tell("info", "Point at a pixel to see its intensity graph.")

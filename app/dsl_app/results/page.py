@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtGui import QDesktopServices, QShowEvent
 from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from dsl_app.results.answers.colours_panel import ColoursPanel
@@ -178,6 +178,11 @@ class ResultsPage(PageWidget):
         state.view.follow(lambda view: self.cloud.setVisible(view is ResultView.CLOUD))
 
     # Show ------------------------------------------------------------------------------------------
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Read the result again if it was replaced while another page was open."""
+        super().showEvent(event)
+        self._control.read_again()
 
     def _show_summary(self) -> None:
         state = self._state

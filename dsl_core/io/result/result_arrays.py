@@ -41,7 +41,8 @@ class ResultArrays:
     """The arrays of a result by the names of `VARIABLES`; what the result does not hold is not there.
 
     ``missing`` names what `completed` put in its place as unknown. ``columns_px`` and ``rows_px`` are where
-    the pixels are in the camera's picture; None where the result does not say.
+    the pixels are in the camera's picture; None where the result does not say. ``stamp`` says when the file
+    was changed last, ns, and its size, bytes, before it was read; None where nobody asked.
     """
 
     path: Path
@@ -51,6 +52,7 @@ class ResultArrays:
     missing: tuple[str, ...] = ()
     columns_px: NDArray[np.int64] | None = None
     rows_px: NDArray[np.int64] | None = None
+    stamp: tuple[int, int] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:

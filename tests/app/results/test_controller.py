@@ -13,10 +13,12 @@ from dsl_app.results.reconstruct_again.state import ReconstructionRequest, troub
 from dsl_app.results.state import Limits, ResultView
 
 from dsl_core.errors import StoreError
+from dsl_core.io.result.annotations_file import load_annotations
+from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.pipeline import Options
 from dsl_core.workflows.captures import import_pictures
 from tests.app.importing.captures.small_capture import PROJECTOR, make_capture
-from tests.app.support.results_controller import SQUARE, Bench
+from tests.app.support.results_controller import SQUARE, Bench, exports, opened
 from tests.app.support.results_controller import bench as bench
 from tests.app.support.results_controller import lacking as lacking
 from tests.app.support.small_result import DARK, NM, write_small_result
@@ -157,3 +159,27 @@ def test_a_band_that_no_pixel_has_leaves_colours_under_another_light(bench: Benc
     assert shown is not None
     assert wanted is not None
     assert np.abs(shown.astype(int) - wanted).max() <= 2
+
+
+def test_a_result_that_is_replaced_is_read_again_and_written_only_as_seen(
+    bench: Bench, tmp_path: Path
+) -> None:
+    bench.control.marks.pin((3, 3))
+    before, writer = opened(bench.state), exports(bench.control)
+    other = load_result(before.path).load()
+    other["depth_mm"] = other["depth_mm"] * 0.5
+    save_result(other, before.path, overwrite=True)
+    writer.write({"ply": tmp_path / "a.ply"}, overwrite=False)
+    assert "was replaced after it had been opened" in bench.told
+    bench.control.answers.write_report(before, None, tmp_path / "a.html")
+    assert "was replaced after it had been opened" in bench.told
+    bench.control.marks.pin((8, 8))
+    assert "The marks are not saved" in bench.told
+    assert [pin.pixel for pin in load_annotations(before.path).pins] == [(3, 3)]
+    assert bench.control.export() is None
+    assert "is read again" in bench.told
+    assert not list(tmp_path.glob("a.*"))
+    now = opened(bench.state)
+    assert np.nanmean(now["depth_mm"]) == pytest.approx(0.5 * np.nanmean(before["depth_mm"]))
+    exports(bench.control).write({"ply": tmp_path / "a.ply"}, overwrite=False)
+    assert (tmp_path / "a.ply").exists()

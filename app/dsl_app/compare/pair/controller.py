@@ -12,12 +12,12 @@ import numpy as np
 
 from dsl_app.compare.pair.state import Pair, PairQuantity, PairState, Side
 from dsl_app.compare.refusals import CHANGED, REPLACED
-from dsl_app.compare.replaced import result_stamp, was_replaced
 from dsl_app.shared.evented import Value
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME
 from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.paths import is_file
+from dsl_app.shared.replaced import result_stamp, was_replaced
 from dsl_app.shared.spectrum import Pixel
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_app.compare.replaced import Stamp
 from dsl_app.shared.evented import Value
+from dsl_app.shared.replaced import Stamp
 from dsl_app.shared.spectrum import Pixel, number_text, number_with_std
 from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_app.shared.wording import short_name

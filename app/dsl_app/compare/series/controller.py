@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_app.compare.refusals import CHANGED, REPLACED
-from dsl_app.compare.replaced import Stamp, result_stamp, was_replaced
 from dsl_app.compare.series.state import SeriesKind, SeriesRow, SeriesState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME
 from dsl_app.shared.notify import Notifier
 from dsl_app.shared.paths import is_dir, is_file
+from dsl_app.shared.replaced import Stamp, result_stamp, was_replaced
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import Cancelled, DecodeError, DslError
 from dsl_core.evaluation.seen_target import Region

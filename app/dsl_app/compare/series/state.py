@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from dsl_app.compare.replaced import Stamp
 from dsl_app.shared.evented import Value
+from dsl_app.shared.replaced import Stamp
 from dsl_core.evaluation.seen_target import Region, SeenTarget
 from dsl_core.evaluation.stage_test import StageTest
 from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint

@@ -9,6 +9,7 @@ from pathlib import Path
 from dsl_app.results.state import Mark, Materials, ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.replaced import load_as_read
 from dsl_core.analysis.classes import SpectralClass
 from dsl_core.analysis.classify import Brightness, Limits, Measure
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -145,10 +146,9 @@ class AnswersController:
 
         def work(progress: Progress) -> list[Path]:
             from dsl_core.analysis.classification import write_classification
-            from dsl_core.io.result.result_file import load_result
 
             progress.report("write the map", 0, 1)
-            return write_classification(load_result(result.path), materials.found, path, overwrite=overwrite)
+            return write_classification(load_as_read(result), materials.found, path, overwrite=overwrite)
 
         def done(files: list[Path]) -> None:
             self._notifier.tell("info", f"Written: {', '.join(file.name for file in files)}.")
@@ -163,12 +163,11 @@ class AnswersController:
         def work(progress: Progress) -> Path:
             from dsl_core.analysis.session_report import session_content, write_report
             from dsl_core.io.result.annotations_file import load_annotations
-            from dsl_core.io.result.result_file import load_result
 
             progress.report("write the report", 0, 1)
             content = session_content(
                 result.path.stem,
-                load_result(result.path),
+                load_as_read(result),
                 load_annotations(result.path),
                 None if materials is None else materials.found,
                 () if materials is None else materials.of_classes,

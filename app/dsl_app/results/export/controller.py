@@ -11,6 +11,7 @@ from dsl_app.results.state import BAND_KEY, BANDS_KEY, COLOUR_KEY, ResultsState,
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_app.shared.paths import is_dir, is_file, there
+from dsl_app.shared.replaced import load_as_read
 from dsl_core.io.export.format import Exporter, Format
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.optics.levels import top_of
@@ -71,14 +72,13 @@ class ExportController:
 
         def work(progress: Progress) -> list[Path]:
             from dsl_core.io.export import export_csv, export_png, formats
-            from dsl_core.io.result.result_file import load_result
 
             exporters: dict[str, Exporter] = {
                 **{form.key: form.write for form in formats().values()},
                 "csv": partial(export_csv, pixels=self._pixels),
                 "png": partial(export_png, **look),
             }
-            data, written = load_result(result.path), []
+            data, written = load_as_read(result), []
             for done, (form, path) in enumerate(targets.items()):
                 check = partial(progress.report, f"write {form}", done, len(targets))
                 check()

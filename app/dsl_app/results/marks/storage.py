@@ -13,6 +13,7 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_app.shared.paths import barrier, stamp_of, there
+from dsl_app.shared.replaced import was_replaced
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_core.errors import DslError
 from dsl_core.io.atomic import set_aside
@@ -173,6 +174,13 @@ class MarkStorage:
         """Save all marks; says why if that fails, and keeps what another window has saved meanwhile."""
         result = self.state.result.value
         if result is None:
+            return
+        if was_replaced(result.path, result.stamp):
+            self._notifier.tell(
+                "warning",
+                f"The marks are not saved: {result.path} was replaced after it had been opened. Open it"
+                " again, then mark it.",
+            )
             return
         path = annotations_path(result.path)
         if stamp_of(path) not in (None, self._stamp):
