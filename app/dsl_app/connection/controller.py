@@ -11,9 +11,9 @@ from typing import Any
 
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.devices.base import DeviceRig, Projector
-from dsl_core.errors import DslError
+from dsl_core.errors import DeviceError, DriftError, DslError
 from dsl_core.progress import Progress
 
 _log = logging.getLogger(__name__)
@@ -66,6 +66,18 @@ class RigController:
         """Mark the rig as lost: a device no longer responds."""
         self.state.link.set(Link.LOST)
         self.state.trouble.set(reason)
+
+    def lose_by(self, error: Exception) -> bool:
+        """Mark the rig as lost if an error says that a device no longer responds; whether it does.
+
+        A device whose pictures are wrong responds, and needs another remedy.
+        """
+        from dsl_core.capture.proven.wrong_pictures import PictureError
+
+        is_lost = isinstance(error, DeviceError) and not isinstance(error, (DriftError, PictureError))
+        if is_lost:
+            self.lose(sentence_of(error))
+        return is_lost
 
     def _open(
         self,

@@ -217,8 +217,7 @@ class LiveController:
             devices.projector.show(trial_picture(kind, size, level, column_px))
 
     def _not_shown(self, error: Exception) -> None:
-        if isinstance(error, DeviceError):
-            self.rig.lose(sentence_of(error))
+        self.rig.lose_by(error)
         self._notifier.tell("error", sentence_of(error))
 
     def _dim(self) -> bool:

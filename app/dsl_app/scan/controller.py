@@ -23,7 +23,7 @@ from dsl_app.shared.paths import is_file, there
 from dsl_app.shared.undo import UndoStack
 from dsl_core.capture.runner import State, Status
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import DeviceError, DriftError, DslError
+from dsl_core.errors import DslError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.scan.origin import rig_notes
@@ -244,8 +244,7 @@ class ScanController:
             # Its page says why and what to do; nobody is told twice.
             show = {"Show the scan": lambda: self.state.wanted.emit(None)}
             self._notifier.offer(f"The scan {folder.name} was interrupted.", show)
-        if isinstance(error, DeviceError) and not isinstance(error, DriftError):
-            self._rig.lose(sentence_of(error))
+        if self._rig.lose_by(error):
             self._reconnector.begin(story)
 
     def _cancelled(self) -> None:

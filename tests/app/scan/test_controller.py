@@ -18,6 +18,7 @@ from dsl_app.shared.notify import NO_RIG
 
 from dsl_core import pipeline
 from dsl_core.capture.metering import Metered
+from dsl_core.capture.proven.wrong_pictures import PictureError
 from dsl_core.capture.runner import State, Status
 from dsl_core.cli.options import PlanChoice
 from dsl_core.devices.base import DeviceRig
@@ -747,6 +748,19 @@ def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(
     assert f"20 of {FRAMES} frames are saved" in bench.state.trouble.value
     bench.scans.start()
     assert ScanReader(tmp_path / "first.dsl").missing() == []
+
+
+def test_a_scan_whose_pictures_are_wrong_closes_no_device(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def covered(self: ScanWriter, shot: Shot, frame: Frame) -> None:
+        raise PictureError("Frame 36 does not show its pattern. Check projector and camera.")
+
+    monkeypatch.setattr(ScanWriter, "write", covered)
+    bench.scans.start()
+    assert phase(bench) is Phase.LOST
+    assert "does not show its pattern" in bench.state.trouble.value
+    assert (bench.rig.state.link.value, bench.state.reconnection.value) == (Link.OPEN, Reconnection.NONE)
 
 
 @dataclass

@@ -11,7 +11,6 @@ from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job, JobProgress, JobRunner
 from dsl_app.shared.notify import sentence_of
-from dsl_core.errors import DeviceError, DriftError
 from dsl_core.progress import Progress
 
 T = TypeVar("T")
@@ -105,12 +104,9 @@ class WizardJobs:
     def fail(self, error: Exception) -> None:
         """Say what went wrong; nothing continues by itself."""
         self._give_up()
-        reason = sentence_of(error)
-        is_lost = _is_of_a_lost_device(error)
-        if is_lost:
-            # Other pages use the same rig, and would still call it connected.
-            self._rig.lose(reason)
-        self.state.trouble.set(reason)
+        # Other pages use the same rig, and would still call it connected.
+        is_lost = self._rig.lose_by(error)
+        self.state.trouble.set(sentence_of(error))
         self.state.can_reconnect.set(is_lost)
 
     def _over(self, then: Callable[[], object]) -> None:
@@ -136,10 +132,3 @@ class WizardJobs:
     def _stopped(self) -> None:
         self._give_up()
         self.state.note.set(stopped_text(self.state))
-
-
-def _is_of_a_lost_device(error: Exception) -> bool:
-    """Whether a device no longer answers; one whose pictures are wrong does, and needs another remedy."""
-    from dsl_core.capture.proven.wrong_pictures import PictureError
-
-    return isinstance(error, DeviceError) and not isinstance(error, (DriftError, PictureError))
