@@ -210,6 +210,7 @@ class CalibrateController:
         self._lock.close()
         outcome = LabelState(note, "muted")
         if error is not None:
+            self._rig.lose_by(error)
             title, reason = ABOUT[name].title if name in ABOUT else name, sentence_of(error)
             at = f" at {title}" if name and not reason.startswith(title) else ""
             outcome = LabelState(f"Calibrating everything stopped{at}: {reason}", "bad")

@@ -9,7 +9,7 @@ from pathlib import Path
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import NO_RIG, Notifier
+from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
 from dsl_app.shared.paths import is_file
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, LibraryLine
 from dsl_core.progress import Progress
@@ -162,4 +162,8 @@ class LibraryController:
             if said.kept:
                 self.load()
 
-        self._rig.run(Job(f"Check {key} for drift", work, done, exclusive=RIG))
+        def failed(error: Exception) -> None:
+            self._rig.lose_by(error)
+            self._notifier.tell("error", sentence_of(error))
+
+        self._rig.run(Job(f"Check {key} for drift", work, done, failed, exclusive=RIG))

@@ -11,6 +11,7 @@ from dsl_app.calibrate.calibrate_all import UnattendedGuide
 from dsl_app.calibrate.overall import Overall
 from dsl_app.calibrate.presentation import main_button
 from dsl_app.calibrate.state import RowState
+from dsl_app.connection.state import Link
 
 from dsl_core.campaign.common.recipe import Step
 from dsl_core.campaign.session import CalibrationSession
@@ -66,6 +67,8 @@ def test_a_lost_device_is_no_fault_of_the_calibration(
     monkeypatch.setattr(UnattendedGuide, "looked", lose)
     bench.control.run_everything()
     assert "stopped at Self-test: The camera does not answer" in bench.state.outcome.value.text
+    assert bench.rig.state.link.value is Link.LOST
+    assert bench.state.trouble.value
     # It goes on once the device is back.
     assert main_button(bench.state, devices) == "everything"
 

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dsl_app.connection.state import RigChoice
+from dsl_app.connection.state import Link, RigChoice
 from dsl_app.shared.jobs.base import Job
 
 from dsl_core.devices.conditions import current_conditions
+from dsl_core.errors import DeviceError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.model.rig import Provenance
 from tests.app.calibrate.calibrate_bench import (
@@ -87,6 +88,18 @@ def plane(tmp_path: Path) -> CalibrateBench:
     made = make_bench(tmp_path, choice=choice)
     made.rig.connect(choice)
     return made
+
+
+def test_a_drift_check_that_loses_a_device_loses_the_rig(
+    plane: CalibrateBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object) -> None:
+        raise DeviceError("The camera does not answer. Check its cable.")
+
+    monkeypatch.setattr(plane.library, "find", gone)
+    plane.control.library.check("own")
+    assert plane.rig.state.link.value is Link.LOST
+    assert "does not answer" in plane.told
 
 
 @pytest.mark.slow
