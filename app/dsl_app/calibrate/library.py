@@ -49,9 +49,18 @@ class LibraryController:
         self._runner.submit(Job("Read the library", work, self._state.library.set, is_minor=True))
 
     def use(self, key: str) -> None:
-        """Scan with a calibration from now on."""
-        self._state.in_use.set(key)
-        self._state.note.set(f"Scans use the calibration {key} from now on. Plan one on the Scan page.")
+        """Scan with a calibration from now on, if the library still has it."""
+
+        def done(_: LibraryEntry) -> None:
+            self._state.in_use.set(key)
+            self._state.note.set(f"Scans use the calibration {key} from now on. Plan one on the Scan page.")
+
+        def failed(error: Exception) -> None:
+            self._notifier.tell("error", sentence_of(error))
+            self.load()
+
+        work = lambda progress: self._library.find(key)  # noqa: E731
+        self._runner.submit(Job(f"Use {key}", work, done, failed, is_minor=True))
 
     def restore(self, name: str, stamp: str) -> None:
         """Make a version the current one; no version is lost."""

@@ -50,6 +50,12 @@ def test_the_library_restores_exports_imports_and_is_used(bench: CalibrateBench,
     assert state.in_use.value == "campaign"
 
 
+def test_a_calibration_that_is_gone_is_not_used(bench: CalibrateBench) -> None:
+    bench.control.library.use("Werk")
+    assert "Werk" in bench.told
+    assert (bench.state.in_use.value, bench.state.note.value) == ("", "")
+
+
 def test_a_window_that_closes_while_the_library_is_read_asks_nothing(
     bench: CalibrateBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from dsl_core.io.calibration_library import LibraryLine
 from dsl_core.model.figure import Figure
+from dsl_core.simulation.published_rig import published_rig
 from tests.app.calibrate.page_stage import Stage, cell, click
 
 LIMITED = Figure(name="error", value=0.8, std=0.1, unit="px", high=0.5, advice="Hold it still.")
@@ -93,8 +94,9 @@ def test_a_missed_drift_check_offers_to_check_again_and_to_go_on(
     click(window.again)
     assert checks == [("room 12", False, True)]
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    stage.bench.library.store("room 12", published_rig())
     click(shown().use)
-    assert stage.bench.state.in_use.value == "room 12"
+    stage.wait(lambda: stage.bench.state.in_use.value == "room 12")
 
 
 def test_a_passed_drift_check_has_nothing_to_offer(stage: Stage) -> None:

@@ -116,8 +116,8 @@ def test_everything_by_one_button_and_the_library_shows_it(
     assert library.use.property("role") == "primary"
     assert stage.page.head.keep.property("role") != "primary"
     click(library.use)
+    stage.wait(lambda: stage.bench.state.in_use.value == "campaign")
     assert library.use.property("role") != "primary"
-    assert stage.bench.state.in_use.value == "campaign"
     assert cell(library.table, 0, 2) == "scans"
     assert not library.restore.isEnabled()
     # And then there is nothing left to do here.

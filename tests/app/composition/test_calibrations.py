@@ -94,7 +94,9 @@ def test_scans_use_the_calibration_that_was_chosen(qtbot: QtBot, window: MainWin
     qtbot.waitUntil(lambda: calibrate.library.table.rowCount() == 1, timeout=60_000)
     QTest.mouseClick(calibrate.library.use, Qt.MouseButton.LeftButton)
     # A program that is killed now remembers it: else scans would use another calibration without a word.
-    assert load_settings(window.parts.settings_path)[0].calibration == "room 12"
+    qtbot.waitUntil(
+        lambda: load_settings(window.parts.settings_path)[0].calibration == "room 12", timeout=60_000
+    )
     scan = window.open_page("scan")
     assert isinstance(scan, ScanPage)
     qtbot.waitUntil(lambda: scan._state.calibration.value.key == "room 12", timeout=60_000)
