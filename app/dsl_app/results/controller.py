@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from dsl_app.results.answers.controller import AnswersController
 from dsl_app.results.contrast.controller import ContrastController
 from dsl_app.results.export.controller import ExportController
-from dsl_app.results.layers import within
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.search.controller import SearchController
-from dsl_app.results.state import DAYLIGHT, NEED_SPECTRA, Limits, ResultsState, ResultView
+from dsl_app.results.state import DAYLIGHT, NEED_SPECTRA, Limits, ResultsState, ResultView, within
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import RESULT_NAME, Kind, kind_of
@@ -245,8 +244,8 @@ class ResultsController:
         if not self.state.busy.value:
             self._notifier.tell(
                 "warning",
-                f"{result.path.name} was replaced after it had been opened, and is read again. Look at it,"
-                " then go on.",
+                f"{result.path.name} was replaced after it had been opened, and is read again. Look at"
+                " it first.",
             )
             self._load(result.path)
         return True

@@ -17,6 +17,7 @@ from dsl_app.results.state import (
     ResultsState,
     ResultView,
     depth_key,
+    within,
 )
 from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map
 from dsl_core.analysis.classify import ClassMap
@@ -74,14 +75,6 @@ class Layer:
     label: str = ""
     keys: tuple[tuple[str, str, float], ...] = ()
     contrast: Contrast | None = None
-
-
-def within(depth_mm: NDArray[Any], limits: Limits | None) -> NDArray[np.bool_]:
-    """Where there is a depth within the limits; without limits, where there is one at all."""
-    shown: NDArray[np.bool_] = np.isfinite(depth_mm)
-    if limits is not None:
-        shown &= (depth_mm >= limits[0]) & (depth_mm <= limits[1])
-    return shown
 
 
 class Layers:

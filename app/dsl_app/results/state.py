@@ -35,6 +35,14 @@ COLOUR_KEY, BANDS_KEY, BAND_KEY = "rgb", "bands", "reflectance"
 _keys = itertools.count(1)
 
 
+def within(depth_mm: NDArray[np.floating], limits: Limits | None) -> NDArray[np.bool_]:
+    """Where there is a depth within the limits; without limits, where there is one at all."""
+    shown: NDArray[np.bool_] = np.isfinite(depth_mm)
+    if limits is not None:
+        shown &= (depth_mm >= limits[0]) & (depth_mm <= limits[1])
+    return shown
+
+
 def depth_key(limits: Limits | None) -> str:
     """The key of the depth picture's levels: other limits begin with levels of their own."""
     return "depth_mm" if limits is None else f"depth_mm {limits[0]:g} {limits[1]:g}"

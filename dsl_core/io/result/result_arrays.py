@@ -256,4 +256,5 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
         # Where pixels are is unknown; their spectra can be looked at all the same.
         arrays["depth_mm"] = np.full(arrays["reflectance"].shape[1:], np.nan, np.float32)
         missing = ("depth_mm",)
-    return ResultArrays(path, nm, arrays, own_attributes(attributes), missing, *_places(found))
+    columns_px, rows_px = _places(found)
+    return ResultArrays(path, nm, arrays, own_attributes(attributes), missing, columns_px, rows_px)

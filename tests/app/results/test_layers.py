@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dsl_app.results.layers import NOTHING, Layers, rgb_of, within
-from dsl_app.results.state import QualityMap, ResultsState, ResultView
+from dsl_app.results.layers import NOTHING, Layers, rgb_of
+from dsl_app.results.state import QualityMap, ResultsState, ResultView, within
 
 from dsl_core.io.result.result_arrays import load_arrays
 from dsl_core.optics.levels import rgba_of_colours

@@ -357,7 +357,8 @@ def test_a_letter_over_another_column_is_no_unit_of_wavelengths(tmp_path: Path) 
 def test_values_are_over_the_nearest_wavelengths_before_them(
     tmp_path: Path, titles: str, others: np.ndarray
 ) -> None:
-    columns, nm, values = [], NM, LEAF * 100
+    columns: list[np.ndarray] = []
+    nm, values = NM, LEAF * 100
     for title in titles.split(","):
         if columns and "%" not in title and title != "std":
             nm, values = others, LEAF * 50

@@ -25,8 +25,8 @@ from dsl_app.results.cloud.views import (
     prepare_cloud_view,
 )
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.layers import NOTHING, Layers, materials_table, rgb_of, tinted_by, within
-from dsl_app.results.state import ResultsState, ResultView, Tool
+from dsl_app.results.layers import NOTHING, Layers, materials_table, rgb_of, tinted_by
+from dsl_app.results.state import ResultsState, ResultView, Tool, within
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme

@@ -107,14 +107,14 @@ def test_lasso_and_measure_have_the_button_one_at_a_time(
     panel._measure_pixel((3, 3))
     panel._measure_pixel((30, 20))
     tool.set(Tool.LASSO)
-    assert panel._draws
+    assert bool(panel._draws)
     assert panel._hint.text() == "Draw around points with the left button."
     assert panel.tools.measure.currentData() is Measure.NOTHING
     assert panel.section is not None
     assert panel.section.isHidden()
     panel.tools.measure_chosen.emit(Measure.DISTANCE)
     assert tool.value is Tool.PIN
-    assert not panel._draws
+    assert not bool(panel._draws)
     assert panel._hint.text() == Measure.DISTANCE.value
 
 
