@@ -154,17 +154,25 @@ def test_a_calibration_that_is_gone_is_forgotten_and_told_once(qtbot: QtBot, win
     assert "no longer has the calibration 'gone'. Scans use the calibration of the rig itself" in toast.text
 
 
-def test_a_calibration_in_use_that_leaves_the_library_is_told_once(qtbot: QtBot, window: MainWindow) -> None:
-    library = CalibrationLibrary()
-    for name in ("room 12", "other"):
+def in_use(
+    qtbot: QtBot, window: MainWindow, library: CalibrationLibrary, *names: str
+) -> tuple[ScanPage, CalibratePage]:
+    """The pages of a window that scans with the first of these calibrations of a library."""
+    for name in names:
         library.store(name, published_rig())
     scan, calibrate = window.open_page("scan"), window.open_page("calibrate")
     assert isinstance(scan, ScanPage)
     assert isinstance(calibrate, CalibratePage)
     idle(qtbot, window)
-    calibrate._state.in_use.set("room 12")
-    qtbot.waitUntil(lambda: scan._state.calibration.value.key == "room 12", timeout=60_000)
+    calibrate._state.in_use.set(names[0])
+    qtbot.waitUntil(lambda: scan._state.calibration.value.key == names[0], timeout=60_000)
     idle(qtbot, window)
+    return scan, calibrate
+
+
+def test_a_calibration_in_use_that_leaves_the_library_is_told_once(qtbot: QtBot, window: MainWindow) -> None:
+    library = CalibrationLibrary()
+    scan, calibrate = in_use(qtbot, window, library, "room 12", "other")
     for name in ("room 12", "other"):
         shutil.rmtree(library.home / name)
         window.open_page("scan")
@@ -178,14 +186,7 @@ def test_a_calibration_in_use_that_leaves_the_library_is_told_once(qtbot: QtBot,
 
 def test_a_calibration_that_cannot_be_read_is_in_use_nowhere(qtbot: QtBot, window: MainWindow) -> None:
     library = CalibrationLibrary()
-    for name in ("room 12", "torn"):
-        library.store(name, published_rig())
-    scan, calibrate = window.open_page("scan"), window.open_page("calibrate")
-    assert isinstance(scan, ScanPage)
-    assert isinstance(calibrate, CalibratePage)
-    calibrate._state.in_use.set("room 12")
-    qtbot.waitUntil(lambda: scan._state.calibration.value.key == "room 12", timeout=60_000)
-    idle(qtbot, window)
+    scan, calibrate = in_use(qtbot, window, library, "room 12", "torn")
     for file in (library.home / "torn").rglob("*.json"):
         file.write_text("{ torn")
     calibrate._state.in_use.set("torn")
