@@ -12,14 +12,8 @@ import numpy as np
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.records import WAVELENGTHS_NM, Floats, Format, Quantity, Spectrum, content_of, rising
 from dsl_core.io.spectra.text import MIN_ROWS, Table, cells_of, decoded, is_text, number_of, tables_of
-from dsl_core.io.spectra.units import (
-    counts_rows,
-    is_beside,
-    is_sign_beside,
-    quantity_of,
-    says_micrometres,
-    to_nanometres,
-)
+from dsl_core.io.spectra.titles import counts_rows, is_beside, is_sign_beside
+from dsl_core.io.spectra.units import quantity_of, says_micrometres, to_nanometres
 
 #: Corrects what a format knows better than its titles say: column's title to quantity.
 Known = Callable[[str], Quantity | None]
