@@ -157,13 +157,18 @@ def venv_variables(venv: Path) -> dict[str, str]:
 
 
 def pip_settings(listing: str) -> dict[str, list[str]]:
-    """Values of ``pip config list`` that uv must be told, by name; later lines win as they do in pip."""
+    """Values of ``pip config list`` that uv must be told, by name; later lines win as they do in pip.
+
+    Values that are empty, such as a variable's that is set to nothing, count for pip as not given.
+    """
     settings: dict[str, list[str]] = {}
     for line in listing.splitlines():
         key, _, value = line.partition("=")
         name = key.rpartition(".")[2].strip()
         if name in ("cert", "find-links", "index-url"):
-            settings[name] = str(ast.literal_eval(value)).split()
+            text = str(ast.literal_eval(value)).strip()
+            if text:
+                settings[name] = [text] if name == "cert" else text.split()
     return settings
 
 

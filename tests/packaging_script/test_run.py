@@ -155,6 +155,11 @@ def test_a_later_setting_of_pip_wins_and_others_are_left_out() -> None:
     assert run.pip_settings(listing) == {"find-links": ["b", "b2"], "index-url": ["i"]}
 
 
+def test_a_setting_of_pip_that_is_empty_was_not_given() -> None:
+    listing = "global.index-url='i'\n:env:.index-url=''\n:env:.find-links=' '\nglobal.cert='/my certs/ca.pem'"
+    assert run.pip_settings(listing) == {"index-url": ["i"], "cert": ["/my certs/ca.pem"]}
+
+
 def test_links_of_pip_and_uv_are_joined_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UV_FIND_LINKS", "b,c")
     assert run.find_links({"find-links": ["a", "b"]}) == ["a", "b", "c"]
