@@ -13,7 +13,7 @@ from dsl_core.io.spectra.units import quantity_of
 #: Words for columns that hold no spectrum of their own, wherever they stand in a title.
 _BESIDE = re.compile(
     r"deviation|abweichung|uncertain|unsicherheit|variance|(?<!\()λ|wave ?(?:len|num)|wvl|wellenl"
-    r"|\b(?:std ?(?:dev)?|st\.? ?dev|errors?|incertitude|sd|sem|flags?|wave|lambda)\b",
+    r"|\b(?:std ?(?:dev)?|st\.? ?dev|errors?|incertitude|sd|sem|flags?|wave|(?<!\()lambda)\b",
     re.IGNORECASE,
 )
 #: Words that say so where they are all of the title: "pixel 3" and "No. 2 blue" are spectra.

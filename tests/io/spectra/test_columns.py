@@ -35,6 +35,7 @@ def table(path: Path, titles: str, *columns: np.ndarray) -> Path:
         ("Wavelength (nm),R,U (k=2)", ["R"]),
         ("Wavelength (nm),R(λ),u(R)", ["R(λ)"]),
         ("λ (nm),ρ(λ),U", ["ρ(λ)"]),
+        ("lambda (nm),R(lambda),T(lambda)", ["R(lambda)", "T(lambda)"]),
         ("nm,T,U", ["T"]),
         ("nm,S,U", ["S", "U"]),
         ("nm,ref +/- 5,paint k=2", ["ref +/- 5", "paint k=2"]),
