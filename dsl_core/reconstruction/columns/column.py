@@ -81,6 +81,10 @@ def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
     fit = fit_peaks(peaks, model_error)
     unusual = _is_unusual(fit)
     poor = torch.nonzero(unusual).ravel()
+    if not single and model_error < COMB_ERROR and len(poor):
+        # What most peaks leave says little of a colour, or a material, whose first orders are bright.
+        fit = _best_of(fit, poor, (fit_peaks(peaks.some(poor), COMB_ERROR),))
+        unusual = _is_unusual(fit)
     if single and len(poor):
         # Sharp lines show no slope but at their ends, where a fit may have to begin.
         again = peaks.some(poor)

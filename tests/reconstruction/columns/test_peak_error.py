@@ -56,15 +56,22 @@ def test_there_is_a_largest_error() -> None:
     assert peak_error(LinePeaks(column.round(), radiance, std, LINES, RESPONSE)) == pytest.approx(LARGEST)
 
 
-def test_combs_are_asked_for_the_first_orders_under_their_peaks() -> None:
-    combs = LineSet(width_px=6, step_px=4, first_px=2.5, lines=150, frames=16)
-    generator = torch.Generator().manual_seed(3)
+COMBS = LineSet(width_px=6, step_px=4, first_px=2.5, lines=150, frames=16)
+
+
+def comb_light(generator: torch.Generator) -> tuple[torch.Tensor, torch.Tensor]:
+    """Columns of 1500 pixels, and what the frames of a comb bring each through the zero order."""
     column = 200 + 200 * torch.rand(1500, generator=generator, dtype=torch.float64)
-    exact = torch.zeros((combs.frames, len(column)), dtype=torch.float64)
-    line = torch.arange(combs.lines)
-    half = combs.width_px / 2
-    light = zero_order_profile(column - combs.centre_px(line)[:, None], -half, half, RESPONSE)
-    exact.index_add_(0, combs.frame(line), light)
+    exact = torch.zeros((COMBS.frames, len(column)), dtype=torch.float64)
+    line = torch.arange(COMBS.lines)
+    half = COMBS.width_px / 2
+    light = zero_order_profile(column - COMBS.centre_px(line)[:, None], -half, half, RESPONSE)
+    return column, exact.index_add_(0, COMBS.frame(line), light)
+
+
+def test_combs_are_asked_for_the_first_orders_under_their_peaks() -> None:
+    generator, combs = torch.Generator().manual_seed(3), COMBS
+    column, exact = comb_light(generator)
     exact += 0.006 * torch.randn(exact.shape, generator=generator, dtype=torch.float64)
     noise = torch.randn(exact.shape, generator=generator, dtype=torch.float64)
     seen = LinePeaks(column.round(), exact + NOISE * noise, torch.full_like(exact, NOISE), combs, RESPONSE)
@@ -78,6 +85,20 @@ def test_combs_are_asked_for_the_first_orders_under_their_peaks() -> None:
     assert own.amplitude_std.numpy() == pytest.approx(usual.amplitude_std.numpy(), rel=0.05)
     unlike = replace(seen, radiance=exact + 0.2 * noise)
     assert peak_error(unlike) == pytest.approx(COMB_ERROR)
+
+
+def test_a_colour_with_brighter_first_orders_keeps_its_columns() -> None:
+    generator = torch.Generator().manual_seed(4)
+    column, exact = comb_light(generator)
+    blue = torch.arange(len(column)) % 4 == 3
+    orders = torch.where(blue, 0.04, 0.004)
+    seen = exact + orders * torch.randn(exact.shape, generator=generator, dtype=torch.float64)
+    peaks = LinePeaks(column.round(), seen, torch.full_like(exact, NOISE), COMBS, RESPONSE)
+    found = refine(peaks, peak_error(peaks))
+    off = (found.column_px - column).abs()
+    assert found.refined[blue].double().mean() > 0.99
+    assert off[blue].square().mean().sqrt() < 0.15
+    assert (off < 1.96 * found.std_px)[blue].double().mean() > 0.85
 
 
 def test_excess_is_nothing_for_noise_and_follows_the_chi_square() -> None:
