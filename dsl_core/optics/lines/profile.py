@@ -119,7 +119,12 @@ def zero_order_profile(
     """
     near, far = columns - start_px, columns - stop_px
     direct = step_edge(near, response.line_spread) - step_edge(far, response.line_spread)
-    return direct + halo_integral(near, response) - halo_integral(far, response)
+    return direct + halo_of_band(columns, start_px, stop_px, response)
+
+
+def halo_of_band(columns: Tensor, start_px: float, stop_px: float, response: ProjectorResponse) -> Tensor:
+    """The part of `zero_order_profile` that is halo."""
+    return halo_integral(columns - start_px, response) - halo_integral(columns - stop_px, response)
 
 
 class LineTable:

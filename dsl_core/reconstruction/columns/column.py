@@ -15,6 +15,7 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
+from dsl_core.optics.lines.profile import halo_of_band
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks
 from dsl_core.reconstruction.columns.loose_columns import LOOSE_PX, loose_columns
 
@@ -101,10 +102,13 @@ def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
     good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
     otherwise = torch.where(fit.measured, fit.brightest, torch.maximum(fit.amplitude, fit.brightest))
     apart = (q - coarse_px).abs() > APART_PX
-    is_loose = (std_px > LOOSE_PX) | (fit.beside < torch.where(apart, CLEAR_SIGMAS, SEEN_SIGMAS))
+    is_loose = fit.beside < torch.where(apart, CLEAR_SIGMAS, SEEN_SIGMAS)
+    if single or peaks.leaves_gaps:
+        # Where every place is on a slope, a comb's wide deviation is that of the light of its other lines.
+        is_loose |= std_px > LOOSE_PX
     saturated = peaks.saturated()
     loose = torch.nonzero(good & ~unusual & is_loose).ravel()
-    if single and len(loose):
+    if len(loose):
         scale, by_slopes = chi_square[loose].clip(min=1), q[loose]
         q[loose], std = loose_columns(peaks.some(loose), model_error, fit.amplitude[loose], scale)
         # Light that saturates lines may saturate the code as well, which is off by some columns then.
@@ -181,7 +185,10 @@ def fit_peaks(peaks: LinePeaks, model_error: float, aside_px: float | None = Non
         information = (amplitude**2 * (weight * along * along).sum(0)).clip(min=1e-12)
         q = q + (amplitude * (weight * along * residual).sum(0) / information).clip(-STEP_PX, STEP_PX)
     used = (weight > 0).sum(0)
-    beside = (amplitude * g * torch.sqrt(weight)).topk(2, 0).values[1]
+    # Halo reaches every place between the lines alike, and says nothing of where their edges are.
+    half_px = peaks.lines.width_px / 2
+    edges = g - halo_of_band(q - centres, -half_px, half_px, peaks.response)
+    beside = (amplitude * edges * torch.sqrt(weight)).topk(2, 0).values[1]
     chi_square = (weight * residual**2).sum(0) / (used - 2).clip(min=1)
     measured = torch.isfinite(variance).all(0)
     if not peaks.lines.single:

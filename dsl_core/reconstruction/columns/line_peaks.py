@@ -23,6 +23,8 @@ from dsl_core.solve.threads import one_kernel_thread
 
 #: Frames on either side of a peak that are looked at where lines leave nothing out.
 FEWEST_BESIDE = 2
+#: So many rms widths of the line spread from an edge there is a slope to measure.
+SLOPE_WIDTHS = 2.0
 #: Fewer pixels of combs do not say how far off their peaks are.
 FEWEST_PIXELS = 300
 
@@ -75,6 +77,13 @@ class LinePeaks:
     def table(self, columns_px: Tensor, reach_px: float) -> LineTable:
         """The profile of a line around columns (pixels,), as far from it as the reach."""
         return LineTable(self.lines.width_px, self.response, reach_px, columns_px, self.widths)
+
+    @property
+    def leaves_gaps(self) -> bool:
+        """Whether between the edges of all lines there are places that no slope reaches."""
+        past = self.lines.width_px % self.lines.step_px
+        widest_px = max(past, self.lines.step_px - past)
+        return bool(widest_px / 2 > SLOPE_WIDTHS * self.response.blur_px)
 
     def saturated(self) -> Tensor:
         """Which pixels have a saturated frame around their peak, (pixels,)."""
