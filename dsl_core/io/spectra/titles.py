@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,15 +24,18 @@ _COUNTER = re.compile(
 )
 #: Signs of uncertainties in certificates: "U (k=2)", "u(R)", "U_c", "±". A sample may be called "U (blue)".
 _UNCERTAINTY = re.compile(
-    r"\W*(?:(?:±|\+/-).*|(?i:(?:expanded )?unc|err)\.?|[0-9]?(?:σ|sigma|sd)|[ΔδdD]R|CI ?\d*"
-    r"|[Uu](?: ?c(?: ?\(.*)?| ?[\[(]?(?:95|%|k ?=|[Rrρβ]\b|rho|reflect).*))\W*",
+    r"\W*(?:(?:±|\+/-).*|(?i:(?:expanded )?unc|err)\.?|[0-9]?(?:σ|sigma|sd)|[Δδ]R|CI ?(?:80|9[059])"
+    r"|[Uu](?: c(?: ?\(.*)?| ?c ?\(.*| ?[\[(](?:95|[Rrρβ]\b).*| ?[\[(]?(?:%|k ?=|[ρβ]\b|rho|reflect).*"
+    r"| ?95 ?%.*))\W*",
     re.DOTALL,
 )
-#: Titles that are those of uncertainties where their values are small, and may be names of samples otherwise.
-_SHORT = re.compile(r"\W*(?:s|se|rms|tolerance|precision)\W*", re.IGNORECASE)
-#: Titles of a column that are uncertainties behind one of these, and may be names of samples without.
-_SIGN, _OF_SIGN = re.compile(r"\W*[Uu]\W*"), re.compile(r"\W*(?:[RrTρβ]|rho)(?: ?\(.*\))?\W*")
-#: Beside a single spectrum, what is everywhere below this share of it is its uncertainty.
+#: Titles that are those of uncertainties where their values are small, and may be names of samples otherwise,
+#: as of quarters ("SE", "UR" of upper right) and pigments.
+_SHORT = re.compile(r"\W*(?:(?i:s|se|rms|tolerance|precision)|[dD]R|CI|[Uu](?:c|C| ?[Rr]| ?95)?)\W*")
+#: Those of them that are uncertainties of any size where all others are quantities, such as these letters.
+_SIGN = re.compile(r"\W*(?:[dD]R|[Uu](?:c|C| ?[Rr]| ?95)?)\W*")
+_OF_SIGN = re.compile(r"\W*(?:[RrTρβ]|rho)(?: ?\(.*\))?\W*")
+#: What is everywhere below this share of the spectrum before it is its uncertainty.
 SMALL = 0.2
 #: Where words of a title meet that are written together: "refl_std", "leafStd".
 _MEETING = re.compile(r"_|(?<=[a-z])(?=[A-Z])")
@@ -43,8 +46,8 @@ def is_beside(title: str) -> bool:
 
     >>> is_beside("leaf_std"), is_beside("CV (%)"), is_beside("camouflage"), is_beside("No. 1 red")
     (True, True, False, False)
-    >>> is_beside("U (k=2)"), is_beside("u(R)"), is_beside("U (blue)")
-    (True, True, False)
+    >>> is_beside("U (k=2)"), is_beside("u(R)"), is_beside("U (blue)"), is_beside("CI 77491")
+    (True, True, False, False)
     """
     words = _MEETING.sub(" ", title)
     return bool(
@@ -54,27 +57,38 @@ def is_beside(title: str) -> bool:
     )
 
 
-def is_sign_beside(title: str, columns: Mapping[str, Floats]) -> bool:
-    """Whether "U" is the uncertainty of another one of the ``columns`` rather than a sample of this name.
+def signs_beside(titles: Sequence[str], cells: Floats) -> list[bool]:
+    """Which columns are uncertainties of others, by a short title that may be the name of a sample as well.
 
-    >>> r, u = np.full(9, 0.5), np.full(9, 0.005)
-    >>> is_sign_beside("U", {"R": r, "U": r}), is_sign_beside("U", {"T1": r, "V": r, "U": u})
-    (True, False)
-    >>> is_sign_beside("U", {"tile 7": r, "U": u}), is_sign_beside("U", {"S": r, "U": r})
-    (True, False)
+    ``cells`` are (rows, columns). Each sample has its own uncertainty behind it: of a sample whose neighbour
+    has none, neither is known of others, and all are samples.
+
+    >>> r = np.full(9, 0.5)
+    >>> signs_beside(["R", "U"], np.stack([r, r], 1)), signs_beside(["A", "s"], np.stack([r, r / 99], 1))
+    ([False, True], [False, True])
+    >>> signs_beside(["UL", "UR", "LL"], np.stack([r, r / 99, r], 1))
+    [False, False, False]
     """
-    others = {name: values for name, values in columns.items() if name != title}
-    if not others:
-        return False
-    if _SHORT.fullmatch(title):
-        least = min(float(np.nanmedian(np.abs(values))) for values in others.values())
-        return bool(np.nanmax(columns[title]) < SMALL * least)
-    if not _SIGN.fullmatch(title):
-        return False
-    if any(_OF_SIGN.fullmatch(name) or quantity_of(name)[0] != "unstated" for name in others):
-        return True
-    (first, *more) = others.values()
-    return not more and bool(np.nanmax(columns[title]) < SMALL * np.nanmedian(np.abs(first)))
+    shorts = [bool(_SHORT.fullmatch(title)) for title in titles]
+    samples = [title for title, short in zip(titles, shorts, strict=True) if not short]
+    if not samples:
+        return [False] * len(titles)
+    are_stated = all(_OF_SIGN.fullmatch(each) or quantity_of(each)[0] != "unstated" for each in samples)
+    # The sample that each column belongs to.
+    of = np.maximum.accumulate([-1 if short else i for i, short in enumerate(shorts)])
+    each_has = not shorts[0] and all(np.count_nonzero(of == i) > 1 for i in set(of))
+    return [
+        short
+        and (
+            (are_stated and bool(_SIGN.fullmatch(title)))
+            or (each_has and _is_small(cells[:, i], cells[:, at]))
+        )
+        for i, (title, short, at) in enumerate(zip(titles, shorts, of, strict=True))
+    ]
+
+
+def _is_small(values: Floats, beside: Floats) -> bool:
+    return bool(np.nanmax(values) < SMALL * np.nanmedian(np.abs(beside)))
 
 
 def counts_rows(title: str, values: Floats) -> bool:

@@ -297,6 +297,36 @@ def test_a_short_title_is_an_uncertainty_where_its_values_are_small(
 
 
 @pytest.mark.parametrize(
+    "titles",
+    ["UL,UR,LL,LR", "DG,DR,DB", "TiO2,CI 77492,CI 77499", "Q,R,S,T,U,V", "NE,NW,SE,SW", "Ur,Au", "U95,U96"],
+)
+def test_a_series_of_samples_is_whole_whatever_short_names_look_like(titles: str, tmp_path: Path) -> None:
+    """One dark sample among others, or one called as a sign, was left out without a word."""
+    names = titles.split(",")
+    columns = [LEAF / 10 if name in ("SE", "DR") else LEAF for name in names]
+    found = read_columns(table(tmp_path / "some.csv", f"nm,{titles}", NM, *columns))
+    assert [each.name for each in found] == names
+
+
+@pytest.mark.parametrize(
+    ("titles", "names"),
+    [
+        ("A,s,B,s", ["A", "B"]),
+        ("R,UR", ["R"]),
+        ("ρ(λ),U95", ["ρ(λ)"]),
+        ("R,U,T,U", ["R", "T"]),
+        ("R,dR", ["R"]),
+    ],
+)
+def test_each_sample_may_have_its_uncertainty_behind_it(
+    titles: str, names: list[str], tmp_path: Path
+) -> None:
+    columns = [LEAF if name in names else LEAF / 100 for name in titles.split(",")]
+    found = read_columns(table(tmp_path / "some.csv", f"nm,{titles}", NM, *columns))
+    assert [each.name for each in found] == names
+
+
+@pytest.mark.parametrize(
     "said",
     ["# water absorption bands removed", "Comment: absorption corrected", "Title: extinction corrected leaf"],
 )

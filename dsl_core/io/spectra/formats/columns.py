@@ -12,7 +12,7 @@ import numpy as np
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.records import WAVELENGTHS_NM, Floats, Format, Quantity, Spectrum, content_of, rising
 from dsl_core.io.spectra.text import MIN_ROWS, Table, cells_of, decoded, is_text, number_of, tables_of
-from dsl_core.io.spectra.titles import counts_rows, is_beside, is_sign_beside
+from dsl_core.io.spectra.titles import counts_rows, is_beside, signs_beside
 from dsl_core.io.spectra.units import quantity_of, says_micrometres, to_nanometres
 
 #: Corrects what a format knows better than its titles say: column's title to quantity.
@@ -53,8 +53,8 @@ def spectra_of(path: Path, table: Table, known: Known | None = None) -> list[Spe
         columns = [i for i in columns if not counts_rows(titles[i], table.cells[:, i])] or columns
     axes = [i for i in columns if _is_axis(titles[i])] or columns[:1]
     values_of = [i for i in columns if i not in axes and not is_beside(titles[i])]
-    shown = {titles[i]: table.cells[:, i] for i in values_of}
-    values_of = [i for i in values_of if not is_sign_beside(titles[i], shown)]
+    signs = signs_beside([titles[i] for i in values_of], table.cells[:, values_of])
+    values_of = [i for i, is_sign in zip(values_of, signs, strict=True) if not is_sign]
     # Of wavelengths in several units side by side, the first ones count.
     firsts = [i for i in axes if i - 1 not in axes]
     spectra = []
