@@ -36,7 +36,9 @@ _OTHER_AXES = (
 #: Percent as a unit: "99 % reflectance" names a white standard, "0-100 %" the values.
 _PERCENT = re.compile(
     r"(?:(?<!\d)(?<!\d )|(?<![\d.])0 ?(?:-|–|\.\.+|…|to) ?100 ?)"
-    r"(?:%|per ?cent|(?<![a-z])(?:pct|prozent|v\. ?h\.)(?![a-z]))|[\[(]0 ?(?:-|–|…|to) ?100[\])]",
+    r"(?:%|per ?cent(?!ile)|(?<![a-z])(?:pct|prozent|v\. ?h\.)(?![a-z]))"
+    # Behind a quantity: a soil from 0 to 100 cm is called alike.
+    r"|(?:\b[RTρ]|ance|grad|ivity|emission|factor|albedo) ?[\[(]0 ?(?:-|–|…|to) ?100[\])]",
     re.IGNORECASE,
 )
 #: The unit of spectrometers, which only a title has behind the number of a sample: "leaf 12 %R". A tile of

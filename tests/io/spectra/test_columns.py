@@ -337,7 +337,16 @@ def test_absorption_in_passing_leaves_reflectance_what_it_is(said: str, tmp_path
 
 
 @pytest.mark.parametrize(
-    "title", ["20%reflectance tile", "50%refl", "99 % reflectance", "reflectance 50 pct tile"]
+    "title",
+    [
+        "20%reflectance tile",
+        "50%refl",
+        "99 % reflectance",
+        "reflectance 50 pct tile",
+        "95th percentile",
+        "soil (0-100)",
+        "reflectance of soil (0-100)",
+    ],
 )
 def test_percent_in_the_name_of_a_tile_is_no_unit(title: str) -> None:
     assert quantity_of(title)[1] == 1.0
