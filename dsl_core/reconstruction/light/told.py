@@ -120,9 +120,9 @@ def colour_findings(colours: Sequence[ColoursAgain]) -> Iterator[FitFinding]:
     )
 
 
-def colour_changed(found: Iterable[FitFinding]) -> bool:
-    """Whether `colour_findings` have told that the light has another colour than at the beginning."""
-    return any(each.name == COLOUR and each.significant for each in found)
+def colour_changed(found: Iterable[FitFinding]) -> float:
+    """How far (log) a colour of the light has come from all light, as `colour_findings` tell; 0 if not."""
+    return max((each.value for each in found if each.name == COLOUR and each.significant), default=0.0)
 
 
 def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:

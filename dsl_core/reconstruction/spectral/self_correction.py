@@ -29,6 +29,10 @@ SURELY = 3.0
 #: Steps towards a film that has moved, and from which displacement of the orders (px) the first one does not
 #: go all the way.
 STEPS, FAR_PX = 2, 0.3
+#: How far light seems displaced at most, nm, where a colour of it has changed by a factor of e against all
+#: light: the slope between two colours, twice that over some 80 nm, times the variance, (20 nm)^2, of what a
+#: colour of the camera sees of an LED.
+LIGHT_NM = 10.0
 
 
 @dataclass(frozen=True)
@@ -60,12 +64,13 @@ def follow(
     scan: ProbedScan,
     as_calibrated: bool = False,
     rows_px: float | None = None,
-    colour_changed: bool = False,
+    colour_changed: float = 0.0,
 ) -> Followed | None:
     """The model of a scan with what the scan shows of the film taken over; None where it shows nothing.
 
     With ``as_calibrated`` the model stays as it is. ``rows_px`` is as for `find_turn`.
-    Light that changed its colour on the way displaces the orders as a film does: then no motion is sure.
+    Light that changed its colour on the way, by ``colour_changed`` (log), displaces the orders a little, as a
+    film does: then no motion is sure that is not larger.
     """
     found = probe(scan)
     if found is None or as_calibrated:
@@ -77,11 +82,12 @@ def follow(
             break
         there = moved(model, more)
         after = probe(replace(scan, model=there))
-        if after is None or not more.sure or colour_changed or not fits_better(found, after):
+        by_light = motion is None and more.shift_px * found.nm_per_px < LIGHT_NM * colour_changed
+        if after is None or not more.sure or by_light or not fits_better(found, after):
             # Spectra that curve along wide bands displace the orders as well; and what displaces one order
             # where there is no other can be more than a film.
             if motion is None and coarseness(found.step_nm) <= 1 and found.seen_orders.all():
-                motion, doubt = replace(more, sure=False, by_light=colour_changed), (there, after)
+                motion, doubt = replace(more, sure=False, by_light=by_light), (there, after)
             break
         model, found = there, after
         motion = more if motion is None else motion.then(more)

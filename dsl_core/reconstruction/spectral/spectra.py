@@ -85,12 +85,12 @@ class SpectralReconstruction:
         dtype: torch.dtype = torch.float32,
         as_calibrated: bool = False,
         rows_px: float | None = None,
-        colour_changed: bool = False,
+        colour_changed: float = 0.0,
     ) -> None:
         """With ``as_calibrated`` the model stays as it is, whatever the scan itself says.
 
         ``rows_px`` is by how much (rms) the rows of a code disagree with depth, None where it has none.
-        ``colour_changed`` is whether the light had another colour at the end than at the beginning.
+        ``colour_changed`` is how far (log) a colour of the light has come from all light since the beginning.
         Where frames come by rows, ``radiance`` and ``std`` are those of the pixels that `learn` asks.
         """
         self.rig, self.pixels = rig, pixels
