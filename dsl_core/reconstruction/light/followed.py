@@ -78,25 +78,25 @@ class _Scan:
         """The lines of the chosen pixels."""
         return self.frames.pick(self._pixels, self._progress)
 
-    def _leak(self) -> NDArray[np.floating]:
+    def _leak(self) -> tuple[NDArray[np.floating], bool]:
         """The projector's light in a black picture, as pictures of its setting are merged, DN per ms.
 
-        Where it is not calibrated, all light in that picture may be; the room's makes levels differ less.
+        Where it is not calibrated, as the second value says, it is all light in that picture.
         """
         rig, settings = self.frames.rig, self.frames.plan.settings
         gains_ms = setting_gains_ms(settings, rig.projector_response)
         longest = int(np.argmax(gains_ms))
         black = self.frames.source.read(self.frames.shots_of("black", 0)[longest])
         dark_dn = black.astype(np.float32) - rig.sensor.black_level_dn
-        share = rig.projector_response.radiance(0.0)
+        share = float(rig.projector_response.radiance(0.0))
         if share > 0:
             dark_dn = np.minimum(dark_dn, self.white.radiance * share * settings[longest].exposure_ms)
-        return dark_dn / float(gains_ms[longest])
+        return dark_dn / float(gains_ms[longest]), share > 0
 
     def levels(self) -> LineLevels | None:
         """How bright each line was; None where lines do not add up to white."""
         white = (self.white.radiance, self.white.variance)
-        levels = line_levels(self.frames.plan, self.code.column, white, self.lines(), self._leak())
+        levels = line_levels(self.frames.plan, self.code.column, white, self.lines(), *self._leak())
         return None if levels is None or levels.misfit > MOST_MISFIT else levels
 
 

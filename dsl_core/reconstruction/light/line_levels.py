@@ -40,6 +40,10 @@ ZERO_PX = 6.0
 AGREED = 0.5
 #: Frames by which quick changes are judged.
 FEWEST_FRAMES = 8
+#: Frames by which the second law is asked for.
+FEWEST_LINES = 16
+#: What frames are off their neighbours has to exceed its noise by this factor to say what of black flickers.
+CLEARLY = 2.0
 #: What frames are expected to differ by, unless they say more.
 LEAST_SPREAD = 0.01
 
@@ -63,11 +67,13 @@ def line_levels(
     white: tuple[NDArray[np.floating], NDArray[np.floating]],
     seen: PickedLines,
     leak: NDArray[np.floating] | float = 0.0,
+    is_calibrated: bool = True,
 ) -> LineLevels | None:
     """Levels of the frames, from `candidates`; None where the patterns or the picture do not tell.
 
     ``column`` is the projector column of each pixel (negative: unknown), ``white`` radiance and variance,
-    both of the whole picture; so is ``leak``, the projector's light in a black picture.
+    both of the whole picture; so is ``leak``, the projector's light in a black picture. Unless that
+    ``is_calibrated`` it is all light there, and frames say which share of it is the projector's.
     """
     if isinstance(plan.spectral, NoSpectral):
         return None
@@ -91,7 +97,9 @@ def line_levels(
     noise = (SUM_ERROR * summed) ** 2 + mean**2 * usual + blacks**2
     pitch = pitch_of(column)
     # What gets through the projector flickers as well: of faint first orders it is most of the light.
-    whole = frames + np.broadcast_to(leak, column.shape).ravel()[picked].astype(np.float64)[:, None]
+    dark = np.broadcast_to(leak, column.shape).ravel()[picked].astype(np.float64)
+    own = 1.0 if is_calibrated else _flickering_share(plan, flat, frames, variance, dark, pitch)
+    whole = frames + own * dark[:, None]
     smooth, smooth_std = _smooth_rows(plan, flat, whole, variance, pitch)
     if 1.1 * _quick(smooth, smooth_std) > LEAST_SPREAD:
         upper = picked < np.median(picked)
@@ -193,6 +201,70 @@ def zone_px(lines: ScanLines, pitch: float) -> float:
     return lines.width_px / 2 + 2 * lines.step_px + ZERO_PX + 1.5 * pitch
 
 
+def _away(lines: ScanLines, column: NDArray[np.integer], zone: float, values: Floats) -> dict[int, Floats]:
+    """Sums (n,) over the pixels away from each line, of its own frame and those around it.
+
+    ``column`` is (pixels,), ``values`` (pixels, frames).
+    """
+    count = values.shape[1]
+    k = np.arange(2, count - 2)
+    centre = k * lines.step_px + lines.width_px / 2
+    # In the order of columns, pixels near a line are next to each other.
+    order = np.argsort(column, kind="stable")
+    first = np.searchsorted(column, centre - zone, sorter=order)
+    last = np.searchsorted(column, centre + zone, "right", sorter=order)
+    sums = np.zeros((count, len(column) + 1))
+    np.cumsum(values.T[:, order], axis=1, out=sums[:, 1:])
+    return {by: sums[k + by, -1] - sums[k + by, last] + sums[k + by, first] for by in (0, *AROUND)}
+
+
+def _flickering_share(
+    plan: CapturePlan,
+    column: NDArray[np.integer],
+    frames: Floats,
+    variance: Floats,
+    dark: Floats,
+    pitch: float,
+) -> float:
+    """The share of the light of black that flickers as lines do; 1 where nothing flickers, or tells.
+
+    Where lines are faint, frames are off their neighbours by what of black flickers alone; where first orders
+    are bright, by these as well. ``dark`` is the light (pixels,) of black.
+    """
+    if not isinstance(plan.spectral, ScanLines) or frames.shape[1] < FEWEST_LINES:
+        return 1.0
+    near = zone_px(plan.spectral, pitch)
+    far = near + float(np.ptp(column)) / 4
+    values = frames, variance, np.broadcast_to(dark[:, None], frames.shape)
+    outside, outer = ([_away(plan.spectral, column, zone, each) for each in values] for zone in (near, far))
+    inner = [{by: sums[by] - out[by] for by in sums} for sums, out in zip(outside, outer, strict=True)]
+    (off, light, noise), (far_off, far_light, far_noise) = (_per_black(*each) for each in (inner, outer))
+    # Each is the flicker times light and the share; their noise adds its squares.
+    square = (off - far_off) ** 2 - noise - far_noise
+    product = (off - far_off) * (far_off * light - off * far_light) + noise * far_light + far_noise * light
+    known = np.isfinite(square + product)
+    clear = square[known].sum() > CLEARLY * (noise + far_noise)[known].sum()
+    if not clear or np.count_nonzero(known) < FEWEST_FRAMES:
+        return 1.0
+    return float(np.clip(product[known].sum() / square[known].sum(), 0.0, 1.0))
+
+
+def _per_black(
+    light: dict[int, Floats], noises: dict[int, Floats], black: dict[int, Floats]
+) -> tuple[Floats, Floats, Floats]:
+    """By how much frames are off their neighbours, their usual light, and the variance of the first.
+
+    All are (n,), and in the light of black, that of the variance squared.
+    """
+    usual, noise = np.zeros((2, len(black[0])))
+    for by, share in AROUND.items():
+        usual += share * light[by]
+        noise += share**2 * noises[by]
+    noise += noises[0] + (SMOOTH_ERROR * usual) ** 2
+    dark = np.where(black[0] > 0, black[0], np.nan)
+    return (light[0] - usual) / dark, usual / dark, noise / dark**2
+
+
 def _smooth_rows(
     plan: CapturePlan, column: NDArray[np.integer], frames: Floats, variance: Floats, pitch: float
 ) -> tuple[Floats, Floats]:
@@ -201,24 +273,10 @@ def _smooth_rows(
     ``column`` is (pixels,), ``frames``, all light of the projector, and ``variance`` are (pixels, frames).
     """
     count = frames.shape[1]
-    if not isinstance(plan.spectral, ScanLines) or count < 16:
+    if not isinstance(plan.spectral, ScanLines) or count < FEWEST_LINES:
         return np.zeros((0, count)), np.zeros(0)
-    step, width = plan.spectral.step_px, plan.spectral.width_px
-    zone = zone_px(plan.spectral, pitch)
-    k = np.arange(2, count - 2)
-    centre = k * step + width / 2
-    # In the order of columns, pixels near a line are next to each other.
-    order = np.argsort(column, kind="stable")
-    first = np.searchsorted(column, centre - zone, sorter=order)
-    last = np.searchsorted(column, centre + zone, "right", sorter=order)
-
-    def away(values: Floats) -> dict[int, Floats]:
-        """Sums (n,) over the pixels away from each line, of its own frame and those around it."""
-        sums = np.zeros((count, len(column) + 1))
-        np.cumsum(values.T[:, order], axis=1, out=sums[:, 1:])
-        return {by: sums[k + by, -1] - sums[k + by, last] + sums[k + by, first] for by in (0, *AROUND)}
-
-    light, noises = away(frames), away(variance)
+    k, zone = np.arange(2, count - 2), zone_px(plan.spectral, pitch)
+    light, noises = (_away(plan.spectral, column, zone, values) for values in (frames, variance))
     own, noise = light[0], noises[0] + sum(share**2 * noises[by] for by, share in AROUND.items())
     used = own > np.maximum(10 * np.sqrt(noise), 0.0)
     rows = np.zeros((len(k), count))

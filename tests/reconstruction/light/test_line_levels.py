@@ -16,12 +16,18 @@ SHAPE = (24, 120)
 
 
 def levels(
-    gains: np.ndarray, plan: CapturePlan = PLAN, by_hit: float = 0.0, leak: float = 0.0, told: bool = True
+    gains: np.ndarray,
+    plan: CapturePlan = PLAN,
+    by_hit: float = 0.0,
+    leak: float = 0.0,
+    told: bool = True,
+    room: float | None = None,
 ) -> LineLevels | None:
     """Of frames with this light: 85 % of each line straight, the rest spread over 40 columns beside it.
 
     By a share ``by_hit`` light beside a line depends on what it hits in the same row. A share ``leak`` of
-    white is in black as well, and flickers as all light does, ``told`` or not.
+    white is in black as well, and flickers as all light does, ``told`` or not. Light of a ``room`` is in
+    black as well, and nobody knows how much of that leaks.
     """
     rng = np.random.default_rng(5)
     profiles = gaussian_filter1d(spectral_profiles(plan)[:, :, 0].astype(float), 0.9, axis=1)
@@ -44,7 +50,9 @@ def levels(
     frames += 0.02 * rng.normal(size=light.shape)
     stack = LineStack(frames.astype(np.float32), np.full(light.shape, 0.02), np.zeros(SHAPE, np.float32))
     whites = (white, sure**2)
-    return line_levels(plan, column, whites, stack.pick(candidates(column, whites)), dark if told else 0.0)
+    seen_dark = (dark if told else 0.0) + (room or 0.0) * surface
+    picked = stack.pick(candidates(column, whites))
+    return line_levels(plan, column, whites, picked, seen_dark, is_calibrated=room is None)
 
 
 def test_levels_of_flickering_frames_are_found() -> None:
@@ -66,6 +74,25 @@ def test_what_gets_through_the_projector_flickers_as_well(told: bool) -> None:
     assert found is not None
     assert (found.quick == pytest.approx(0.0115, rel=0.3)) == told
     assert (np.std((found.log - np.log(gains))[4:-4]) < 0.008) == told
+
+
+@pytest.mark.parametrize(
+    ("leak", "room"), [(0.0, 0.02), (0.0, 0.3), (0.02, 0.0), (0.02, 0.1), (0.005, 0.005)]
+)
+def test_frames_tell_what_of_black_flickers(leak: float, room: float) -> None:
+    """All light of a room, taken for the projector's, made its flicker four times less and more."""
+    gains = 1 + 0.1 * np.random.default_rng(2).uniform(-1, 1, PLAN.spectral_count)
+    found = levels(gains, leak=leak, room=room)
+    assert found is not None
+    assert found.quick == pytest.approx(0.05, rel=0.2)
+    assert np.std((found.log - np.log(gains))[4:-4]) < 0.008
+
+
+@pytest.mark.parametrize(("leak", "room"), [(0.0, 0.1), (0.02, 0.0)])
+def test_of_steady_frames_it_does_not_matter_what_flickers(leak: float, room: float) -> None:
+    found = levels(np.ones(PLAN.spectral_count), leak=leak, room=room)
+    assert found is not None
+    assert found.quick < 0.003
 
 
 def test_steady_frames_are_found_steady() -> None:
