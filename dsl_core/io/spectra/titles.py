@@ -10,10 +10,12 @@ import numpy as np
 from dsl_core.io.spectra.records import Floats
 from dsl_core.io.spectra.units import quantity_of
 
-#: Words for columns that hold no spectrum of their own, wherever they stand in a title.
+#: Words for columns that hold no spectrum of their own, wherever they stand in a title; "L_λ" and "R(λ)" are
+#: spectra, and "Δλ" is not.
 _BESIDE = re.compile(
-    r"deviation|abweichung|uncertain|unsicherheit|variance|(?<!\()λ|wave ?(?:len|num)|wvl|wellenl"
-    r"|\b(?:std ?(?:dev)?|st\.? ?dev|errors?|incertitude|sd|sem|flags?|wave|(?<!\()lambda)\b",
+    r"deviation|abweichung|uncertain|unsicherheit|variance|wave ?(?:len|num)|wvl|wellenl"
+    r"|(?<![(a-ce-zρτ])(?<!\b[a-zρτ] )λ|(?<!\()(?<!\b[a-zρτ] )\blambda\b"
+    r"|\b(?:std ?(?:dev)?|st\.? ?dev|errors?|incertitude|sd|sem|flags?|wave)\b",
     re.IGNORECASE,
 )
 #: Words that say so where they are all of the title: "pixel 3" and "No. 2 blue" are spectra.

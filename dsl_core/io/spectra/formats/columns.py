@@ -18,7 +18,9 @@ from dsl_core.io.spectra.units import quantity_of, says_micrometres, to_nanometr
 #: Corrects what a format knows better than its titles say: column's title to quantity.
 Known = Callable[[str], Quantity | None]
 _WAVELENGTH = re.compile(
-    r"wave ?l|wvl|\bwl\b|\bwave\b|wellenl|(?<![a-zA-Zρ(])(?:lambda|λ)|^\W?(?:nm|um|µm|μm)\W?$", re.IGNORECASE
+    r"wave ?l|wvl|\bwl\b|\bwave\b|wellenl|(?<![a-zρτΔδ(])(?<!\b[a-zρτ][ _])(?:lambda|λ)"
+    r"|^\W?(?:nm|um|µm|μm)\W?$",
+    re.IGNORECASE,
 )
 #: Lines in which the wavelengths of a table of lines are looked for.
 MOST_HEADER = 300
