@@ -62,6 +62,18 @@ def test_columns_are_left_out_by_whole_words(titles: str, names: list[str], tmp_
     assert [each.name for each in found] == names
 
 
+@pytest.mark.parametrize("titles", ["R1,nm,R2,nm", "nm,R1,nm,R2", "X,R1,X,R2"])
+def test_each_spectrum_of_pairs_has_its_own_wavelengths_wherever_these_are(
+    titles: str, tmp_path: Path
+) -> None:
+    values = iter((LEAF, LEAF / 2))
+    axes = iter((NM, NM + 5))
+    columns = [next(values) if "R" in title else next(axes) for title in titles.split(",")]
+    found = read_columns(table(tmp_path / "some.csv", titles, *columns))
+    assert [(each.name, each.nm[0]) for each in found] == [("R1", 400), ("R2", 405)]
+    np.testing.assert_allclose(found[1].values, LEAF / 2, rtol=1e-4)
+
+
 def test_a_column_that_counts_rows_under_no_title_is_no_spectrum(tmp_path: Path) -> None:
     """It would pass for percent, and make the others a hundred times too dark."""
     path = table(tmp_path / "frame.csv", ",wavelength,leaf,bark", np.arange(NM.size), NM, LEAF, LEAF / 2)

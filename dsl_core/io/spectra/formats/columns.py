@@ -47,25 +47,35 @@ def read_columns(path: Path) -> list[Spectrum]:
 def spectra_of(path: Path, table: Table, known: Known | None = None) -> list[Spectrum]:
     """The spectra of a table with wavelengths in one column or in several; raises `CalibrationError`.
 
-    The values of a column belong to the nearest wavelengths before it.
+    The values of a column belong to the nearest wavelengths before it, or behind it where these are last.
     """
     titles = table.titles
     columns = [i for i in range(len(titles)) if np.isfinite(table.cells[:, i]).any()]
     if len(columns) > 2:
         columns = [i for i in columns if not counts_rows(titles[i], table.cells[:, i])] or columns
-    axes = [i for i in columns if _is_axis(titles[i])] or columns[:1]
+    axes = [i for i in columns if _is_axis(titles[i])]
+    if not axes:
+        # Of "X, Y, X, Y", every X.
+        axes = [i for i in columns if i == columns[0] or titles[i] == titles[columns[0]] != ""]
     values_of = [i for i in columns if i not in axes and not is_beside(titles[i])]
     signs = signs_beside([titles[i] for i in values_of], table.cells[:, values_of])
     values_of = [i for i, is_sign in zip(values_of, signs, strict=True) if not is_sign]
     # Of wavelengths in several units side by side, the first ones count.
     firsts = [i for i in axes if i - 1 not in axes]
+    are_last = bool(values_of) and values_of[0] < firsts[0] and values_of[-1] < firsts[-1]
     spectra = []
-    for first, following in zip(firsts, [*firsts[1:], len(titles)], strict=True):
-        # What is before all wavelengths belongs to the first ones.
-        own = [i for i in values_of if i < following and (i > first or first == firsts[0])]
+    for first in firsts:
+        own = [i for i in values_of if _axis_of(i, firsts, are_last) == first]
         # What the whole header says is of one column only where it is the only one.
         spectra += _over_axis(path, table, first, own, "" if len(values_of) > 1 else table.above, known)
     return spectra
+
+
+def _axis_of(column: int, firsts: Sequence[int], are_last: bool) -> int:
+    """The column of the wavelengths of a column of values; what is before all of them has the first ones."""
+    if are_last:
+        return next(each for each in firsts if each > column)
+    return max((each for each in firsts if each < column), default=firsts[0])
 
 
 def _is_axis(title: str) -> bool:
