@@ -27,7 +27,13 @@ from dsl_core.devices.base import (
     Stage,
 )
 from dsl_core.devices.device_thread import DeviceThread, DriverError, HangingError
-from dsl_core.devices.plausible import require_frame, require_position, require_spectrum, require_whole
+from dsl_core.devices.plausible import (
+    has_dark,
+    require_frame,
+    require_position,
+    require_spectrum,
+    require_whole,
+)
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.model.base import problems_in_words
 from dsl_core.model.frames import Frame
@@ -38,6 +44,8 @@ _log = logging.getLogger(__name__)
 T = TypeVar("T")
 #: Longest text of a driver's error that is quoted.
 _QUOTED = 200
+#: A larger share of a row than this is not of dead pixels.
+_DEAD = 0.01
 
 
 class _HangsError(DeviceError):
@@ -245,13 +253,13 @@ class _Camera(_Guard, Camera):
         of others had no count either: there a black level would show.
         """
         empty = pixels.max(axis=1) == 0
-        self._had_dark |= not pixels[~empty].all()
+        self._had_dark = self._had_dark or has_dark(pixels)
         is_again = np.array_equal(empty, self._empty) and not (empty & self._filled).any()
         self._empty = empty
         self._filled |= pixels.min(axis=1) > 0
         if not (self._had_zero or (is_again and self._had_dark)):
             require_whole(pixels, self._name)
-        self._had_zero |= not pixels[0].all()
+        self._had_zero |= bool(np.mean(pixels[0] == 0) > _DEAD)
 
     def _ask(self, verb: str, action: Callable[[], T], more_s: float = 0.0) -> T:
         return self._line.ask(self._name, verb, action, self._patience.answer_s + more_s)

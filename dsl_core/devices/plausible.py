@@ -19,6 +19,8 @@ from dsl_core.model.spectral import SpectralCurve
 EXPOSURE_TOLERANCE = 0.05
 #: Wavelengths that every spectrum has to cover, and those that can be meant at all, nm.
 COVERED_NM, POSSIBLE_NM = (430.0, 660.0), (150.0, 3000.0)
+#: A larger share of pixels than this is not dead.
+DEAD = 1e-3
 #: Samples that a spectrum has at least; as many equal ones at its very peak are clipped.
 FEWEST_SAMPLES, CLIPPED_SAMPLES = 16, 6
 #: Peaks that fall by more than so many steps of rounding are no smooth ones; digits of rounded values.
@@ -73,10 +75,23 @@ def _is_float(value: Real) -> bool:
     return True
 
 
+def has_dark(pixels: NDArray[np.uint16]) -> bool:
+    """Whether rows with counts have pixels without any, as of a camera without black level where it is dark.
+
+    Some pixels may be dead, and a transfer that is cut ends within a row.
+    """
+    if pixels.min() > 0:
+        return False
+    none, empty = pixels == 0, pixels.max(axis=1) == 0
+    cut = np.flatnonzero(~empty[:-1] & empty[1:])
+    none[cut] &= ~np.logical_and.accumulate(none[cut, ::-1], axis=1)[:, ::-1]
+    return bool(np.count_nonzero(none[~empty]) > DEAD * none[~empty].size)
+
+
 def require_whole(pixels: NDArray[np.uint16], name: str) -> None:
     """Raise `DeviceError` for rows without any count where all others have a black level: a cut transfer."""
     empty = pixels.max(axis=1) == 0
-    if empty.any() and not empty.all() and pixels[~empty].min() > 0:
+    if empty.any() and not empty.all() and not has_dark(pixels):
         raise DeviceError(
             f"{name} delivered {int(empty.sum())} of {empty.size} rows empty. Check its cable; on a slow"
             " connection lower its frame rate."

@@ -330,6 +330,28 @@ def test_rows_that_are_always_empty_are_cut_off_where_others_have_a_black_level(
             rig.camera.snap()
 
 
+@pytest.mark.parametrize("flaw", ["dead pixel", "dead pixel in the first row", "cut within a row"])
+def test_rows_are_missing_though_some_pixels_of_others_have_no_count(
+    flaw: str, lab: _Lab, beam: _Lab
+) -> None:
+    """Transfers seldom end with a row, and each camera has dead pixels: either let all missing rows pass."""
+    lab.camera_info = replace(lab.camera_info, width_px=200, height_px=40)
+    rig = guarded(DeviceRig("lab", lab, beam), DeviceThread("lab"))
+    pixels = np.full((40, 200), 64, np.uint16)
+    pixels[30:] = 0
+    place = {
+        "dead pixel": (5, 7),
+        "dead pixel in the first row": (0, 9),
+        "cut within a row": (29, slice(90, 200)),
+    }
+    pixels[place[flaw]] = 0
+    lab.act["snap"] = partial(replace, FRAME, pixels=pixels)
+    rig.camera.configure(10.0)
+    for _ in range(3):
+        with pytest.raises(DeviceError, match="10 of 40 rows empty"):
+            rig.camera.snap()
+
+
 def test_a_driver_may_fill_the_same_memory_again(lab: _Lab, rig: DeviceRig) -> None:
     buffer = np.zeros((4, 6), np.uint16)
     lab.act["snap"] = lambda: replace(FRAME, pixels=buffer)
