@@ -144,7 +144,9 @@ def _stereo(path: Path, request: CaptureRequest, camera_px: Size, projector_px: 
     from dsl_core.io.published.stereo_words import placed
     from dsl_core.simulation.published_rig import published_rig
 
-    found = load_any_stereo(path, camera_px, projector_px, request.unit_mm, request.from_projector)
+    # The box has 1 mm until somebody sets another unit; a file that states its own is read in that.
+    unit_mm = None if request.unit_mm == 1 else request.unit_mm
+    found = load_any_stereo(path, camera_px, projector_px, unit_mm, request.from_projector)
     tables = ("camera", request.camera_curves), ("LEDs", request.led_curves)
     curves = [None if table is None else load_curves(table, device) for device, table in tables]
     rig = lenses_on(published_rig(), found, path.name, *curves)

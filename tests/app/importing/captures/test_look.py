@@ -148,6 +148,22 @@ def test_what_a_calibration_lacks_is_named(folder: Path, tmp_path: Path) -> None
     assert Place.CALIBRATION in listed(missing, tmp_path)[1]
 
 
+def test_a_calibration_that_states_its_unit_is_read_in_that_until_another_is_set(
+    folder: Path, tmp_path: Path
+) -> None:
+    """The box shows 1 mm before anybody has touched it, which is no statement against the file."""
+    matrix = [[50.0, 0, 16], [0, 50.0, 12], [0, 0, 1]]
+    file = tmp_path / "stereo.json"
+    parts = {"cam_K": matrix, "proj_K": matrix, "R": np.eye(3).tolist(), "T": [0.1, 0, 0], "unit": "m"}
+    file.write_text(json.dumps(parts))
+    request = replace(request_for(folder, tmp_path), calibration=str(file))
+    told, troubles = listed(request, tmp_path)
+    assert not troubles
+    assert "the projector is 100 mm from the camera" in told
+    _, troubles = listed(replace(request, unit_mm=10.0), tmp_path)
+    assert "which is 1000 mm, not 10 mm as given" in troubles[Place.CALIBRATION]
+
+
 def test_a_calibration_for_other_sizes_is_refused(folder: Path, tmp_path: Path) -> None:
     nominal = replace(request_for(folder, tmp_path), calibration=NOMINAL)
     assert "The pictures are 64 × 48 px" in listed(nominal, tmp_path)[1][Place.CALIBRATION]
