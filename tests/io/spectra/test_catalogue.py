@@ -171,9 +171,14 @@ def test_several_spectra_are_listed_by_name(tmp_path: Path) -> None:
     path = write(tmp_path / "a.cgats", made.cgats("REFLECTIVE", "100.0"))
     assert [each.name for each in read_references(path).references] == ["patch 1", "patch 2"]
     np.testing.assert_allclose(read_reference(path, "patch 2").values, SHARE / 5, atol=1e-6)
-    decimals = re.sub(r"(?<=\d)\.(?=\d)", ",", made.cgats("REFLECTIVE", "100"))
-    of_commas = read_reference(write(tmp_path / "commas.cgats", decimals), "patch 2")
+    exact = (
+        made.cgats("REFLECTIVE", "100.0").replace('NM "400"', 'NM "400.3"').replace('NM "700"', 'NM "700.3"')
+    )
+    of_commas = read_reference(
+        write(tmp_path / "commas.cgats", re.sub(r"(?<=\d)\.(?=\d)", ",", exact)), "patch 2"
+    )
     np.testing.assert_allclose(of_commas.values, SHARE / 5, atol=1e-6)
+    assert of_commas.wavelengths_nm[0] == pytest.approx(400.3)
     with pytest.raises(CalibrationError, match=r"2 spectra \('patch 1', 'patch 2'\)"):
         read_spectrum(path, COVERS, radiance=False)
     assert len(read_radiances(write(tmp_path / "b.csv", made.konica_minolta()), COVERS)) == 2

@@ -74,14 +74,13 @@ def _rows(path: Path, known: dict[str, str], fields: list[str], data: list[str])
     labels = [match[1] for i in columns if (match := _FIELD.fullmatch(fields[i]))]
     nm = bands if bands is not None and len(bands) == len(columns) else np.array([float(x) for x in labels])
     quantity, factor = _KINDS.get(known.get("MEAS_TYPE", "").upper(), ("unstated", 1.0))
-    norm = number_of(known.get("SPECTRAL_NORM", "1"))
+    norm = _number(known.get("SPECTRAL_NORM", "1"))
     if not 0 < norm < 1e9:
         raise CalibrationError(f"{path.name}: a SPECTRAL_NORM of {norm:g} is impossible. Export it again.")
     name_at = next((fields.index(name) for name in _NAMES if name in fields), None)
     spectra = []
     for row in range(0, len(data), len(fields)):
-        # Programs of some languages write "0,2".
-        values = np.array([number_of(data[row + i].replace(",", ".")) for i in columns])
+        values = np.array([_number(data[row + i]) for i in columns])
         rising_nm, values = rising(path, nm, values)
         name = data[row + name_at] if name_at is not None else ""
         is_scaled = quantity != "unstated" and "SPECTRAL_NORM" in known
@@ -91,12 +90,17 @@ def _rows(path: Path, known: dict[str, str], fields: list[str], data: list[str])
 
 def _bands(path: Path, known: dict[str, str]) -> np.ndarray | None:
     keys = ("SPECTRAL_START_NM", "SPECTRAL_END_NM", "SPECTRAL_BANDS")
-    start, end, count = (number_of(known.get(key, "")) for key in keys)
+    start, end, count = (_number(known.get(key, "")) for key in keys)
     if not np.isfinite([start, end, count]).all():
         return None
     if not 2 <= count <= 10_000:
         raise CalibrationError(f"{path.name}: SPECTRAL_BANDS is {count:g}. Export it again.")
     return np.linspace(start, end, int(count))
+
+
+def _number(word: str) -> float:
+    """The number that a word is, NaN if none; programs of some languages write "0,2"."""
+    return number_of(word.replace(",", "."))
 
 
 FORMAT = Format("CGATS, ArgyllCMS", (".cgats", ".sp", ".ti3", ".ccss", ".cie"), is_cgats, read_cgats)
