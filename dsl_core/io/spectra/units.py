@@ -13,8 +13,11 @@ _PREFIXES = (
     | dict.fromkeys(("µ", "μ", "u", "micro"), 1e-6)
     | {"milli": 1e-3, "nano": 1e-9}
 )
-#: Power, then area and steradian somewhere behind it: "mW/m^2/sr/nm", "W·sr⁻¹·m⁻²·nm⁻¹", "W/(sr sqm nm)".
-_POWER = re.compile(r"(?<![a-zA-Zµμ])(nano|micro|milli|[pnmµμukM]?)(?:W|[Ww]atts?)(?![a-zA-Z])([^\n]{0,40})")
+#: Power, then area and steradian somewhere behind it: "mW/m^2/sr/nm", "Wsr⁻¹m⁻²nm⁻¹", "W/(sr sqm nm)".
+_POWER = re.compile(
+    r"(?<![a-zA-Zµμ])(nano|micro|milli|[pnmµμukM]?)(?:W|[Ww]atts?)"
+    r"(?:(?![a-zA-Z])|(?=(?:[cm]?m|sr)\^?\{?[-−⁻]))([^\n]{0,40})"
+)
 #: "m^2", "cm**2", "cm^{-2}", "sq cm", of an area in the unit that stands for ``{}``.
 _AREA = r"(?<![a-zA-Z]){0}\s?(?:\^?\{{?[-−]?2\}}?|\*\*[-−]?2|²|⁻²)|sq ?{0}"
 _SQUARE_CM, _SQUARE_MM = re.compile(_AREA.format("cm")), re.compile(_AREA.format("mm"))

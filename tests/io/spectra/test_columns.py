@@ -384,6 +384,9 @@ def test_percent_in_words_is_a_unit(title: str) -> None:
         ("W/(m² sr Å)", 10.0),
         ("W m^{-2} sr^{-1} \\mu m^{-1}", 1e-3),
         ("MW/(sr m2 nm)", 1e6),
+        ("mWm-2sr-1nm-1", 1e-3),
+        ("µWcm⁻²sr⁻¹nm⁻¹", 1e-2),
+        ("mWsr-1m-2nm-1", 1e-3),
     ],
 )
 def test_units_of_radiance_are_read_as_others_write_them(unit: str, factor: float) -> None:
