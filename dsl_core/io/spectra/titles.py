@@ -63,7 +63,8 @@ def signs_beside(titles: Sequence[str], cells: Floats) -> list[bool]:
     """Which columns are uncertainties of others, by a short title that may be the name of a sample as well.
 
     ``cells`` are (rows, columns). Each sample has its own uncertainty behind it: of a sample whose neighbour
-    has none, neither is known of others, and all are samples.
+    has none, neither is known of others, and all are samples. Behind all of them, in small letters, it is
+    that of each.
 
     >>> r = np.full(9, 0.5)
     >>> signs_beside(["R", "U"], np.stack([r, r], 1)), signs_beside(["A", "s"], np.stack([r, r / 99], 1))
@@ -78,15 +79,17 @@ def signs_beside(titles: Sequence[str], cells: Floats) -> list[bool]:
     are_stated = all(_OF_SIGN.fullmatch(each) or quantity_of(each)[0] != "unstated" for each in samples)
     # The sample that each column belongs to.
     of = np.maximum.accumulate([-1 if short else i for i, short in enumerate(shorts)])
-    each_has = not shorts[0] and all(np.count_nonzero(of == i) > 1 for i in set(of))
-    return [
-        short
-        and (
-            (are_stated and bool(_SIGN.fullmatch(title)))
-            or (each_has and _is_small(cells[:, i], cells[:, at]))
-        )
-        for i, (title, short, at) in enumerate(zip(titles, shorts, of, strict=True))
-    ]
+    places = np.flatnonzero(~np.array(shorts))
+    each_has = not shorts[0] and all(np.count_nonzero(of == i) > 1 for i in places)
+
+    def is_sign(i: int) -> bool:
+        if are_stated and _SIGN.fullmatch(titles[i]):
+            return True
+        is_last = titles[i].islower() and of[i] == places[-1]
+        own = [of[i]] if each_has else places if is_last else []
+        return len(own) > 0 and all(_is_small(cells[:, i], cells[:, at]) for at in own)
+
+    return [short and is_sign(i) for i, short in enumerate(shorts)]
 
 
 def _is_small(values: Floats, beside: Floats) -> bool:

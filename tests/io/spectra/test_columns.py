@@ -327,6 +327,7 @@ def test_a_series_of_samples_is_whole_whatever_short_names_look_like(titles: str
     ("titles", "names"),
     [
         ("A,s,B,s", ["A", "B"]),
+        ("A,B,se", ["A", "B"]),
         ("R,UR", ["R"]),
         ("ρ(λ),U95", ["ρ(λ)"]),
         ("R,U,T,U", ["R", "T"]),
