@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.result.result_file import checked_attributes, damage_of, own_attributes
+from dsl_core.io.result.result_file import checked_attributes, damage_of, of_one_writing, own_attributes
 from dsl_core.model.attributes import BAND_WIDTH, FIRST_BAND, stated_band_width_nm, weights_of_wider
 from dsl_core.model.result import VARIABLES
 from dsl_core.model.result_order import (
@@ -229,9 +229,12 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
 
     Raises `StoreError`, also for a result of another program whose arrays have other axes.
     """
+    return of_one_writing(path, lambda: _loaded(path, progress or NoProgress()))
+
+
+def _loaded(path: Path, progress: Progress) -> ResultArrays:
     from dsl_core.io.result.stored_arrays import stored_arrays
 
-    progress = progress or NoProgress()
     attributes = checked_attributes(path)
     found = stored_arrays(path, partial(damage_of, path))
     _require_one_size(found, attributes.get("labels", {}), path)

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from json import JSONDecodeError
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 
 _log = logging.getLogger(__name__)
+T = TypeVar("T")
+#: So often a result is read again that was replaced while it was read.
+_MOST_READINGS = 5
 #: Attributes on disk that are not the result's.
 _OF_THE_FOLDER = ("labels", INVENTORY, CHECKSUM, MADE_OF)
 
@@ -100,7 +103,38 @@ def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
 
     Raises `StoreError` when the folder is missing, damaged, not a result, or of another schema version.
     """
-    return opened(path, checked_attributes(path), lazy=lazy)
+    return of_one_writing(path, lambda: opened(path, checked_attributes(path), lazy=lazy))
+
+
+def of_one_writing(path: Path, read: Callable[[], T]) -> T:
+    """What ``read`` makes of a result: again where another took its place meanwhile, as nothing else tells.
+
+    The attributes of one result would be taken for those of the other's arrays. Raises what ``read`` raises,
+    and `StoreError` for a result that does not keep still.
+    """
+    for _ in range(_MOST_READINGS):
+        before = _writing_of(path)
+        try:
+            found = read()
+        except StoreError:
+            if _writing_of(path) in (before, None):
+                raise
+            continue
+        if _writing_of(path) == before:
+            return found
+    raise StoreError(
+        f"{path} was replaced {_MOST_READINGS} times while it was read. Wait until what writes it has ended,"
+        " and open it then."
+    )
+
+
+def _writing_of(path: Path) -> tuple[int, ...] | None:
+    """By what a folder's metadata, which are written last, are told from those of one that replaced it."""
+    try:
+        found = (path / "zarr.json").stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def checked_attributes(path: Path) -> dict[str, Any]:
