@@ -34,7 +34,7 @@ class StoreError(DslError):
 
 
 class DriveError(StoreError):
-    """A whole drive does not answer; nothing is known to be wrong with what is on it."""
+    """A drive does not answer, or refuses a file; nothing is known to be wrong with what is on it."""
 
 
 class TakenError(StoreError):

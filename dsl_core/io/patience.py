@@ -1,7 +1,8 @@
 """Drives that do not answer for a while: a network share that vanishes, a disk that wakes up.
 
 What a scan has captured cannot be captured again just like that, so its frames are written and read with
-patience. A file that is missing, refused or damaged is none of a drive's silence, and is told at once.
+patience. A file that is missing, refused or damaged is none of a drive's silence, and is told at once. One
+that is refused is not lost: it may be as whole as it was.
 """
 
 from __future__ import annotations
@@ -29,6 +30,10 @@ _AWAY = {
 }
 #: The same on Windows: not ready, path or name of the network gone, no answer in time, I/O error, cut off.
 _AWAY_WINDOWS = {21, 53, 59, 64, 121, 1117, 1167, 1231}
+#: What systems say of a file that is there and cannot be opened now: it is closed to this user or, as Windows
+#: says it, in use by another program; the computer has no more open files or memory to give.
+_CLOSED = {errno.EACCES, errno.EPERM}
+_SHORT = {errno.EMFILE, errno.ENFILE, errno.ENOMEM}
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,16 @@ class Patience:
 CHECK_DRIVE = "Its drive does not answer; what is saved there is kept. Check its connection, and try again."
 #: That of every scan.
 USUAL = Patience()
+
+
+def is_refused(error: BaseException | None) -> bool:
+    """Whether a file, which may be whole, could not be opened as things are now."""
+    return isinstance(error, OSError) and error.errno in _CLOSED | _SHORT
+
+
+def says_nothing(error: BaseException | None) -> bool:
+    """Whether a failure tells nothing of the file that was to be read: it may be as whole as it was."""
+    return is_away(error) or is_refused(error)
 
 
 def is_away(error: BaseException | None) -> bool:
@@ -89,6 +104,20 @@ def patiently(
         return done
 
 
+def advice_on(error: OSError, otherwise: str) -> str:
+    """What to do about a file that cannot be read; ``otherwise`` where the file itself is at fault."""
+    if error.errno in _CLOSED:
+        return (
+            "It may be whole, but this user or program may not read it. Change its permissions, or close the"
+            " program that uses it, and try again."
+        )
+    if error.errno in _SHORT:
+        return "It may be whole, but this computer can open no more. Close other programs, and try again."
+    return CHECK_DRIVE if is_away(error) else otherwise
+
+
 def drive_error(path: Path, error: OSError) -> DriveError:
-    """The sentence for a drive that does not answer."""
-    return DriveError(f"{path} cannot be read or written ({error.strerror or error}). {CHECK_DRIVE}")
+    """The sentence for a drive that does not answer, or a file that is refused."""
+    return DriveError(
+        f"{path} cannot be read or written ({error.strerror or error}). {advice_on(error, CHECK_DRIVE)}"
+    )

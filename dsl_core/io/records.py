@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from dsl_core.errors import DslError, StoreError
 from dsl_core.io.atomic import make_folder, write_atomic
-from dsl_core.io.patience import CHECK_DRIVE, is_away
+from dsl_core.io.patience import advice_on
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.sealed import SealError, seal, unseal
 from dsl_core.io.staging import write_text
@@ -68,8 +68,8 @@ def read_record(
     except UnicodeDecodeError as failure:
         raise error(f"{name} cannot be read (it is not a text file). {remedy}") from failure
     except OSError as failure:
-        reason, advice = failure.strerror or failure, CHECK_DRIVE if is_away(failure) else remedy
-        raise error(f"{name} cannot be read ({reason}). {advice}") from failure
+        reason = failure.strerror or failure
+        raise error(f"{name} cannot be read ({reason}). {advice_on(failure, remedy)}") from failure
     except ValidationError as failure:
         raise error(f"{name} {fault}: {_problems(failure, most)}. {remedy}") from failure
     except SealError as failure:

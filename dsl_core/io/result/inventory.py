@@ -17,6 +17,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
+from dsl_core.io.patience import drive_error, says_nothing
 from dsl_core.io.reading import read_bounded, require_plain
 from dsl_core.model.base import Record
 
@@ -70,7 +71,11 @@ def check_inventory(folder: Path, attributes: Mapping[str, Any]) -> bool:
         if _name(folder, path) not in inventory.crc32:
             raise _damaged(folder, f"its file {_name(folder, path)} was added after it was written")
     for name, crc32 in inventory.crc32.items():
-        if zlib.crc32(read_bounded(folder / name)) != crc32:
+        try:
+            content = read_bounded(folder / name)
+        except OSError as error:
+            raise _unread(folder, name, error) from error
+        if zlib.crc32(content) != crc32:
             raise _damaged(folder, f"its file {name} does not match its checksum")
     return True
 
@@ -94,7 +99,13 @@ def _size(folder: Path, name: str) -> int:
     try:
         return require_plain(folder / name)
     except OSError as error:
-        raise _damaged(folder, f"its file {name} cannot be read ({error.strerror or error})") from error
+        raise _unread(folder, name, error) from error
+
+
+def _unread(folder: Path, name: str, error: OSError) -> StoreError:
+    if says_nothing(error):
+        return drive_error(folder / name, error)
+    return _damaged(folder, f"its file {name} cannot be read ({error.strerror or error})")
 
 
 def _damaged(folder: Path, what: str) -> StoreError:

@@ -22,7 +22,8 @@ import numpy as np
 
 from dsl_core.errors import StoreError
 from dsl_core.io.kinds import what_is_at
-from dsl_core.io.reading import read_json
+from dsl_core.io.patience import drive_error, is_away, is_refused, says_nothing
+from dsl_core.io.reading import read_bounded, read_json
 from dsl_core.io.result.arrays import plain, write_variable
 from dsl_core.io.result.inventory import CHECKSUM, INVENTORY, MADE_OF, check_inventory, with_inventory
 from dsl_core.io.staging import FolderKind, staged
@@ -154,8 +155,22 @@ def own_attributes(stored: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def damage_of(path: Path, error: Exception) -> StoreError:
-    """What is said of a result whose arrays cannot be read."""
+    """What is said of a result whose arrays cannot be read.
+
+    Where its metadata cannot be read either, that is the drive's doing; else a single file is damaged.
+    """
+    if isinstance(error, OSError) and (is_refused(error) or (is_away(error) and _is_gone(path))):
+        return drive_error(path, error)
     return StoreError(f"The result {path} is damaged ({error}). Reconstruct it again from the scan's frames.")
+
+
+def _is_gone(path: Path) -> bool:
+    """Whether the drive of a result does not answer."""
+    try:
+        read_bounded(path / "zarr.json")
+    except OSError as error:
+        return is_away(error)
+    return False
 
 
 def opened(path: Path, stored: Mapping[str, Any], *, lazy: bool = True) -> xr.Dataset:
@@ -234,6 +249,8 @@ def read_attributes(path: Path) -> dict[str, Any]:
             " again from the scan's frames."
         ) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        if isinstance(error, OSError) and says_nothing(error):
+            raise drive_error(path / "zarr.json", error) from error
         raise StoreError(
             f"{path / 'zarr.json'} is damaged ({error}). Reconstruct the result again from the scan's frames."
         ) from error

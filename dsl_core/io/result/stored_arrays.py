@@ -17,6 +17,7 @@ import zarr
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
+from dsl_core.io.patience import drive_error, is_away
 
 #: What zarr, its codecs and the file system raise for damaged chunks.
 FAILURES = (OSError, ValueError, KeyError, RuntimeError, TypeError, ArithmeticError)
@@ -74,7 +75,9 @@ class StoredArray:
     def _require_unchanged(self) -> None:
         try:
             is_same = _files(self.folder) == self.files
-        except OSError:
+        except OSError as error:
+            if is_away(error):
+                raise drive_error(self.folder.parent, error) from error
             is_same = False
         if not is_same:
             raise StoreError(

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import store_error, sync_folder, write_all, write_atomic
-from dsl_core.io.patience import drive_error, is_away, patiently
+from dsl_core.io.patience import drive_error, is_away, patiently, says_nothing
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.sealed import seal, unseal
 from dsl_core.model.base import Record
@@ -51,7 +51,7 @@ def read_log(path: Path) -> tuple[list[LogEntry], int]:
     except FileNotFoundError:
         return [], 0
     except OSError as error:
-        if is_away(error):
+        if says_nothing(error):
             raise drive_error(path, error) from error
         raise StoreError(
             f"{path} cannot be read ({error.strerror or error}). Restore it from a copy of the scan."

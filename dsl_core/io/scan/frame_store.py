@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import make_folder, store_error, sync_folder, write_atomic
-from dsl_core.io.patience import drive_error, is_away, patiently
+from dsl_core.io.patience import drive_error, is_away, is_refused, patiently, says_nothing
 from dsl_core.io.reading import parts_of, read_bounded, read_json
 from dsl_core.io.scan.blosc_blocks import HEADER, Bytes, blocks_of
 from dsl_core.model.plan import spoken_number
@@ -63,7 +63,7 @@ class FrameStore:
             if not isinstance(found, dict):
                 raise ValueError("not an object")
         except (OSError, ValueError) as error:
-            if isinstance(error, OSError) and is_away(error):
+            if isinstance(error, OSError) and says_nothing(error):
                 raise drive_error(self._metadata_path, error) from error
             raise StoreError(
                 f"{self._metadata_path} is missing or damaged, so the frames cannot be read."
@@ -90,7 +90,7 @@ class FrameStore:
         try:
             names = [path.name.split(".") for path in self.folder.glob("c.*.0.0")]
         except OSError as error:
-            raise (drive_error if is_away(error) else store_error)(self.folder, error) from error
+            raise (drive_error if says_nothing(error) else store_error)(self.folder, error) from error
         return {int(name[1]) for name in names if name[1].isdigit()}
 
     def write(self, index: int, pixels: NDArray[np.uint16]) -> None:
@@ -160,6 +160,8 @@ class FrameStore:
         except OSError as error:
             if is_away(error) and self._is_gone():
                 raise drive_error(self.folder, error) from error
+            if is_refused(error):
+                raise drive_error(self.path(index), error) from error
             reason = error.strerror or error
             raise ChunkError(f"its file {self.path(index)} cannot be read ({reason})") from error
 

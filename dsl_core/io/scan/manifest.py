@@ -15,7 +15,7 @@ from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.kinds import what_is_at
-from dsl_core.io.patience import drive_error, is_away
+from dsl_core.io.patience import drive_error, says_nothing
 from dsl_core.io.records import read_record
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import differences as setting_differences
@@ -63,7 +63,7 @@ def read_manifest(folder: Path) -> Manifest:
     try:
         is_scan = (folder / MANIFEST_NAME).exists()
     except OSError as error:
-        if is_away(error):
+        if says_nothing(error):
             raise drive_error(folder, error) from error
         raise
     if not is_scan:
