@@ -59,14 +59,18 @@ def put_in_place(folder: Path, target: Path, *, overwrite: bool, kind: FolderKin
     with _room_for([target], overwrite, kind) as room:
         _sync_tree(folder)
         check_targets([target], overwrite=overwrite, kind=kind)
-        # By way of the room, which is where an old one may be left.
-        draft = room / target.name
-        os.replace(folder, draft)
-        try:
-            _move_in(draft, target, room)
-        except OSError:
-            os.replace(draft, folder)
-            raise
+        if not os.path.lexists(target):
+            # In one step: whoever is killed between two has neither the result nor what it was made of.
+            _move_in(folder, target, room)
+        else:
+            # By way of the room, which is where an old one may be left.
+            draft = room / target.name
+            os.replace(folder, draft)
+            try:
+                _move_in(draft, target, room)
+            except OSError:
+                os.replace(draft, folder)
+                raise
         sync_folder(target.parent)
 
 
@@ -226,7 +230,21 @@ def _clear(room: Path, targets: Sequence[Path]) -> None:
                     f"{target} could not be replaced ({error.strerror or error})."
                     f" The old one is kept as {aside}; move it back."
                 ) from error
-    shutil.rmtree(room, ignore_errors=True)
+    _remove(room)
+
+
+def _remove(room: Path) -> None:
+    """Delete a room with its lock last, by which what a kill or a drive keeps of it is known as left over."""
+    with contextlib.suppress(OSError):
+        for path in room.iterdir():
+            if path.name == _LOCK_NAME:
+                continue
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink()
+        if [path.name for path in room.iterdir()] in ([], [_LOCK_NAME]):
+            shutil.rmtree(room, ignore_errors=True)
 
 
 def _aside(target: Path, room: Path) -> Path:

@@ -18,7 +18,7 @@ from dsl_core.io.published.dataset import export_dataset
 from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.lock import FolderLock
-from dsl_core.io.staging import check_targets, clear_leftovers, staged, write_text
+from dsl_core.io.staging import check_targets, clear_leftovers, put_in_place, staged, write_text
 from dsl_core.io.swap import exchange
 from dsl_core.model.plan import CapturePlan, LineComb, Shot
 from tests.cases.small_result import small_result
@@ -313,6 +313,41 @@ def test_what_a_killed_writer_left_is_removed_but_not_what_another_is_writing(
     write_text(tmp_path / "b.txt", "b")
     assert sorted(each.name for each in tmp_path.iterdir()) == [".mine.partial", "a.txt", "b.txt"]
     assert "was left by a writer that was killed" in caplog.text
+
+
+def test_a_room_that_was_not_cleared_to_its_end_is_cleared_by_the_next_writer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "r.zarr"
+    _replace(path, "old")
+
+    def killed(folder: Path, **_: object) -> None:
+        for each in folder.iterdir():
+            if each.is_file():
+                each.unlink()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "rmtree", killed)
+        _replace(path, "new")
+    assert len(list(tmp_path.glob(".*.partial/writer.lock"))) == 1
+    write_text(tmp_path / "a.txt", "a")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.txt", "r.zarr"]
+
+
+def test_a_finished_folder_comes_to_its_place_in_one_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finished, replace, moved = tmp_path / "made", os.replace, list[tuple[str, str]]()
+    save_result(small_result(), finished)
+
+    def counted(source: Path, target: Path) -> None:
+        moved.append((Path(source).name, Path(target).name))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", counted)
+    put_in_place(finished, tmp_path / "r.zarr", overwrite=False, kind=RESULT_FOLDER)
+    assert moved == [("made", "r.zarr")]
+    assert [each.name for each in tmp_path.iterdir()] == ["r.zarr"]
 
 
 def test_a_writer_that_was_killed_before_it_had_a_lock_leaves_nothing(tmp_path: Path) -> None:
