@@ -8,6 +8,7 @@ it looks like that whenever it is captured, so that one of them is captured once
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,16 +34,16 @@ LEFT, MOST_LINES = 0.5, 16
 
 @dataclass(frozen=True)
 class _Step:
-    """Change of the parts from the line before to that of ``shot``, and beyond what it was before, DN."""
+    """Change of the parts from the line before to that of ``shot``, and beyond what it was before, DN.
+
+    ``size_dn`` is the largest of the latter.
+    """
 
     shot: Shot
     change: Floats
     jump: Floats
+    size_dn: float
     is_sudden: bool
-
-    @property
-    def size_dn(self) -> float:
-        return float(np.abs(self.jump).max())
 
 
 class PassingLight:
@@ -53,6 +54,7 @@ class PassingLight:
         self._known = known
         self._steps: list[_Step] = []
         self._first: tuple[_Step, Shot] | None = None
+        self._lines_of: dict[int, list[Shot]] = {}
         rows, columns = known.raster.shape
         down, across = np.arange(rows) * PARTS // rows, np.arange(columns) * PARTS // columns
         self._parts = (down[:, None] * PARTS + across).ravel()
@@ -64,7 +66,8 @@ class PassingLight:
         # Lines that are captured again are compared with those before them.
         steps = [s for s in self._steps if s.shot.setting == shot.setting and s.shot.index < shot.index]
         self._steps = steps
-        lines = [s for s in known.shots[: shot.index] if (s.role, s.setting) == ("spectral", shot.setting)]
+        lines = self._lines(shot.setting)
+        lines = lines[: bisect_left(lines, shot.index, key=_place)]
         before = known.kept.get(lines[-1].index) if lines else None
         if before is None or known.lit is None:
             return None
@@ -73,8 +76,9 @@ class PassingLight:
         usual = [each.size_dn for each in steps if not each.is_sudden][-USUAL_OF:]
         least = max(SUDDEN * max(usual, default=0.0), SIGMAS * float(np.nan_to_num(std).max()), LEAST_DN)
         jump = np.nan_to_num(change - trend)
-        is_sudden = len(usual) >= FEWEST_USUAL and float(np.abs(jump).max()) > least
-        steps.append(_Step(shot, change, jump, is_sudden))
+        size_dn = float(np.abs(jump).max())
+        is_sudden = len(usual) >= FEWEST_USUAL and size_dn > least
+        steps.append(_Step(shot, change, jump, size_dn, is_sudden))
         first = _since(steps, lines) if is_sudden else None
         if first is None:
             return None
@@ -84,6 +88,13 @@ class PassingLight:
         self._first = first, lines[lines.index(first.shot) - 1]
         most = float(first.jump[np.abs(first.jump).argmax()])
         return Finding(shot, Verdict.PASSING, again, f"up to {most:+.1f} DN on the mean of a part")
+
+    def _lines(self, setting: int) -> list[Shot]:
+        """All lines of a setting, looked for once: there are hundreds, and each asks for those before it."""
+        if setting not in self._lines_of:
+            shots = self._known.shots
+            self._lines_of[setting] = [s for s in shots if (s.role, s.setting) == ("spectral", setting)]
+        return self._lines_of[setting]
 
     def is_past(self, seen: Counts) -> bool:
         """Whether the first of the lines last found, captured once more, has its light no longer."""
@@ -114,6 +125,10 @@ class PassingLight:
         change = np.bincount(part, np.subtract(seen, old, dtype=np.float32), count)
         variance = np.bincount(part, known.noise.variance(seen) + known.noise.variance(old), count)
         return (change / told).astype(np.float32), (np.sqrt(variance) / told).astype(np.float32)
+
+
+def _place(shot: Shot) -> int:
+    return shot.index
 
 
 def _since(steps: list[_Step], lines: list[Shot]) -> _Step | None:
