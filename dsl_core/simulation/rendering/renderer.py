@@ -24,6 +24,7 @@ from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.lines.profile import zero_order_profile
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.simulation.rendering.first_orders import Runs, add_bands, by_pixel, order_light, white_runs
+from dsl_core.simulation.rendering.kept_lines import KeptLines
 from dsl_core.simulation.rendering.order_tables import OrderTables
 from dsl_core.simulation.rendering.pattern_table import PatternTable, without_repeats
 from dsl_core.simulation.rendering.shading import surface_shading
@@ -105,11 +106,13 @@ class Renderer:
         self.response = halo
         self._white: Tensor | None = None
         self._colours: tuple[Renderer, ...] = ()
+        self._lines = KeptLines()
 
     def through(self, transmission: SpectralCurve | None) -> Renderer:
         """The same view through a filter in front of the camera (None: without); the geometry is shared."""
         other = copy.copy(self)
         other.rig, other.slicing, other._white, other._colours = self._bare, BROAD, None, ()
+        other._lines = KeptLines()
         if transmission is not None:
             passed = np.interp(NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)
             # On the renderer's own grid, as the rig's may be too coarse for a narrow band.
@@ -130,14 +133,27 @@ class Renderer:
 
     def expected(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Signal (rows, columns), DN per ms, of drive levels (height, width, 3) or (height, width)."""
-        return self._picture(self._light(as_colour(image)))
+        light = self._light(as_colour(image))
+        if light.table is None and light.runs is not None and len(light.runs) == 1:
+            return self._line(*light.runs[0])
+        return self._picture(self._signal(light))
+
+    def _line(self, start: float, stop: float, level: float) -> NDArray[np.float32]:
+        """Signal of one white line, in proportion to its picture at full light, which plans ask for often."""
+        response = self.rig.projector_response
+        line = np.array([[start, stop, 1.0]], np.float32)
+        full = self._lines.of((start, stop), lambda: self._picture(self._of_bands(line) * self.shading))
+        signal = full * np.float32(response.radiance(level) - response.black_fraction)
+        if response.black_fraction:
+            signal += self._lines.of(None, lambda: self._picture(self._black() * self.shading))
+        return signal
 
     def planes(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Signal as a camera without a mosaic would see it, DN per ms, shape (3, rows, columns)."""
         if not self._colours:
             self._colours = tuple(self._of_colour(channel) for channel in range(3))
         light = self._light(as_colour(image))
-        return np.stack([colour._picture(light) for colour in self._colours])
+        return np.stack([colour._picture(colour._signal(light)) for colour in self._colours])
 
     def of_parts(self, image: NDArray[np.uint8]) -> Tensor:
         """Signal of every part, (parts,), DN per ms, of the same drive levels as `expected`."""
@@ -147,7 +163,7 @@ class Renderer:
         """The same view, every pixel of which sees one colour; the geometry is shared."""
         other = copy.copy(self)
         other.material_channel = self.material_channel.div(3, rounding_mode="floor") * 3 + channel
-        other._white, other._colours = None, ()
+        other._white, other._colours, other._lines = None, (), KeptLines()
         return other
 
     def _light(self, colour: NDArray[np.uint8]) -> _Light:
@@ -178,9 +194,10 @@ class Renderer:
                 add_bands(signal, tables, self.material_channel, bands)
         return signal * self.shading
 
-    def _picture(self, light: _Light) -> NDArray[np.float32]:
+    def _picture(self, signal: Tensor) -> NDArray[np.float32]:
+        """What pixels see (rows, columns) of the signal of their parts (P,)."""
         out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
-        out.index_add_(0, self.pixels, self._signal(light))
+        out.index_add_(0, self.pixels, signal)
         return out.reshape(self.shape).cpu().numpy()
 
     def _black(self) -> Tensor | float:
@@ -189,14 +206,19 @@ class Renderer:
         if black == 0:
             return 0.0
         if self._white is None:
-            signal = torch.zeros_like(self.column)
             # As runs, which cost a fifth of slices and need none of their code for a first picture.
-            bands = np.array([[-0.5, self.rig.projector.width_px - 0.5, 1.0]], np.float32)
-            self._add_zero_bands(signal, bands)
-            for tables in self.orders:
-                add_bands(signal, tables, self.material_channel, bands)
-            self._white = signal
+            self._white = self._of_bands(
+                np.array([[-0.5, self.rig.projector.width_px - 0.5, 1.0]], np.float32)
+            )
         return black * self._white
+
+    def _of_bands(self, bands: NDArray[np.float32]) -> Tensor:
+        """Light of white columns, (n, 3) of start, stop (px) and radiance, without that of black."""
+        signal = torch.zeros_like(self.column)
+        self._add_zero_bands(signal, bands)
+        for tables in self.orders:
+            add_bands(signal, tables, self.material_channel, bands)
+        return signal
 
     def _add_zero_bands(self, signal: Tensor, bands: NDArray[np.float32]) -> None:
         """Add the zero order of white columns, (n, 3) of start, stop (px) and radiance."""
