@@ -14,7 +14,8 @@ from dsl_core.errors import StoreError
 from dsl_core.io.objects.address import require_local
 
 PARTIAL_SUFFIX = ".partial"
-_DISK_FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
+_QUOTA = getattr(errno, "EDQUOT", errno.ENOSPC)
+_DISK_FULL = {errno.ENOSPC, _QUOTA}
 
 #: NumPy's ``tofile``, which asks for room first, and Pillow's encoders, when the system gives or takes less.
 _SHORT_WRITE = re.compile(r"\d+ requested and \d+ written|Not enough free space to write|encoder error -2")
@@ -128,19 +129,41 @@ def store_error(path: Path, error: OSError) -> StoreError:
     if error.errno in _DISK_FULL or (
         error.errno is None and (_SHORT_WRITE.search(str(error)) or is_full(path))
     ):
-        return disk_full(path)
+        return _quota_used_up(path) if error.errno == _QUOTA != errno.ENOSPC else disk_full(path)
     reason = error.strerror or str(error)
     return StoreError(
         f"{path} could not be written ({reason}). Check the folder's permissions and its drive."
     )
 
 
+def _quota_used_up(path: Path) -> StoreError:
+    """The sentence for a disk that may have space, but none for this user."""
+    return StoreError(
+        f"Your quota is used up: {path} could not be written. Nothing saved before is lost; delete files of"
+        " yours from this drive, or have the quota raised, and try again."
+    )
+
+
 def disk_full(path: Path) -> StoreError:
-    """The sentence for a disk without space."""
+    """The sentence for a disk without space, or without room for one more file whatever its size."""
+    if _lacks_names(path):
+        return StoreError(
+            f"The drive can hold no more files, although it has space: {path} could not be written. Nothing"
+            " saved before is lost; delete files that you do not need, and try again."
+        )
     return StoreError(
         f"The disk is full: {path} could not be written. Nothing saved before is lost;"
         " free some space and try again."
     )
+
+
+def _lacks_names(path: Path) -> bool:
+    """Whether the drive of a file has space, but no entry left in its table of files."""
+    try:
+        found = os.statvfs(path.parent)
+    except (OSError, AttributeError):  # Windows has neither the call nor such a table
+        return False
+    return found.f_files > 0 and found.f_favail == 0 and found.f_bavail * found.f_frsize > _LITTLE_BYTES
 
 
 def is_full(path: Path) -> bool:

@@ -149,3 +149,16 @@ def test_new_folders_are_synced_where_their_names_are(
     assert synced == [tmp_path, tmp_path / "a"]
     make_folder(tmp_path / "a" / "b")
     assert len(synced) == 2
+
+
+def test_what_a_disk_lacks_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, full = tmp_path / "file", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert "The disk is full" in str(store_error(path, full))
+    quota = OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
+    assert "Your quota is used up" in str(store_error(path, quota))
+
+    class NoNames:
+        f_files, f_favail, f_bavail, f_frsize = 1000, 0, 1 << 20, 4096
+
+    monkeypatch.setattr(os, "statvfs", lambda _: NoNames, raising=False)
+    assert "can hold no more files, although it has space" in str(store_error(path, full))
