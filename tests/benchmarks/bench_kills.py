@@ -43,7 +43,8 @@ from tests.benchmarks.common import options, print_table, write_json
 from tests.cases import tiny_campaign
 from tests.cases.fake_recipe import FakeRecipe
 
-TWIN = {"size": "64x48", "scene": "plane"}
+#: High enough for several bands of the rows that are solved together, so that a killed result is resumed.
+TWIN, BAND_ROWS = {"size": "48x160", "scene": "plane"}, 64
 PLAN = CapturePlan(
     code=GrayCode(rows=False),
     spectral=ScanLines(width_px=10, step_px=10),
@@ -145,7 +146,7 @@ def _frames(folder: Path) -> str:
 
 
 def _reconstruct(folder: Path, progress: NoProgress) -> None:
-    made = Options(band_rows=12, as_calibrated=True)
+    made = Options(band_rows=BAND_ROWS, as_calibrated=True)
     scans.reconstruct_to(folder / "a.zarr", folder / "a.dsl", options=made, overwrite=True)
 
 
