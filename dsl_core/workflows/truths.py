@@ -42,9 +42,12 @@ def truth_of(
 ) -> Truth:
     """Truth from the rig that took the scan, or the one named, of the part of the picture that a result is.
 
-    Raises `DecodeError` if there is none.
+    ``options`` replace those that the rig of the scan was opened with; a rig named has no others. Raises
+    `DecodeError` if there is none.
     """
-    origin = (rig_name, dict(options or {})) if rig_name else rig_of_notes(result.attrs)
+    given = dict(options or {})
+    noted = None if rig_name else rig_of_notes(result.attrs)
+    origin = (rig_name, given) if rig_name else noted and (noted[0], noted[1] | given)
     if origin is None:
         raise DecodeError(
             "The result does not say with which rig it was captured, so there is no truth to compare with."

@@ -35,6 +35,13 @@ def test_a_part_has_the_truth_of_its_place(whole: xr.Dataset) -> None:
     assert found.depth.rmse_mm < 2 * known.depth.rmse_mm
 
 
+def test_options_replace_those_of_the_scan_and_leave_others(whole: xr.Dataset) -> None:
+    """The truth of another scene must not be that of the scan's, without a word."""
+    own, other = truth_of(whole), truth_of(whole, options={"scene": "plane"})
+    assert own.size_px == other.size_px
+    assert set(other.names) != set(own.names)
+
+
 @pytest.mark.parametrize("bands", [[20], [3, 30], [0, 1, 5, 40]])
 def test_bands_are_those_of_the_result(whole: xr.Dataset, bands: list[int]) -> None:
     some, every = whole.isel(wavelength_nm=bands), truth_of(whole)
