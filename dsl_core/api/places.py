@@ -109,7 +109,12 @@ def whole_numbers(given: object) -> tuple[int, ...] | None:
 
 
 def as_array(given: Any) -> NDArray[Any]:
-    """What was given as an array; without a value where lists in it differ in length, or there is none."""
+    """What was given as an array; without a value where lists in it differ in length, or there is none.
+
+    What numpy has masked nobody knows: in a mask it marks no pixel, and among numbers none of them counts.
+    """
+    if np.ma.is_masked(given):
+        return np.asarray(given.filled(False)) if given.dtype == bool else np.empty(0, object)
     try:
         return np.asarray(given)
     except (ValueError, TypeError):

@@ -40,6 +40,17 @@ def test_a_mask_of_xarray_marks_the_pixels_that_its_coordinates_say() -> None:
     xr.testing.assert_identical(found, known)
 
 
+def test_what_numpy_masks_marks_no_pixel() -> None:
+    """Comparing a masked array leaves any value where it is masked."""
+    result = small_result()
+    depth_mm = np.nan_to_num(result["depth_mm"].values, nan=700.0)
+    far = np.ma.masked_less(depth_mm, 705.0) > 0
+    assert far.data.all()
+    np.testing.assert_array_equal(place_mask(result, far), depth_mm >= 705.0)
+    with pytest.raises(DecodeError, match="whole pixels"):
+        place_mask(result, np.ma.array([2, 1, 3, 2], mask=[False, False, False, True]))
+
+
 def test_a_mask_of_the_whole_picture_marks_a_part_of_it() -> None:
     result = small_result()
     part = result.isel(x=slice(1, 6), y=slice(1, 4))
