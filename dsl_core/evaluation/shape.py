@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.solve.grid_mesh import are_joined
+from dsl_core.solve.normal import BAND_95
 from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float32] | NDArray[np.float64]
@@ -114,15 +115,21 @@ def _inverse_plane(
 
 
 def _tilt(normal: NDArray[np.float64], covariance: NDArray[np.float64]) -> tuple[float, float]:
-    """Angle of a unit normal (3,) with its covariance (3, 3) to the camera's axis, and its deviation, deg."""
-    tilt_deg = float(np.degrees(np.arccos(np.clip(-normal[2], -1, 1))))
-    # Only the part of an error that is across the normal tilts it, towards or from the axis.
+    """Angle of a unit normal (3,) with its covariance (3, 3) to the camera's axis, and its deviation, deg.
+
+    What is across the direction of the tilt adds to it only while that direction is unknown: noise alone
+    tilts a plane that faces the camera by both components, and an angle is never below zero.
+    """
+    tilt = float(np.arccos(np.clip(-normal[2], -1, 1)))
     towards = np.array([0.0, 0.0, -1.0]) - normal * -normal[2]
     size = float(np.linalg.norm(towards))
     if size < 1e-9:
         towards, size = np.array([1.0, 0.0, 0.0]), 1.0
     towards /= size
-    return tilt_deg, float(np.degrees(np.sqrt(towards @ covariance @ towards)))
+    across = np.cross(normal, towards)
+    along_variance, across_variance = (float(each @ covariance @ each) for each in (towards, across))
+    within = across_variance / max(across_variance + (tilt / BAND_95) ** 2, 1e-30)
+    return float(np.degrees(tilt)), float(np.degrees(np.sqrt(along_variance + within * across_variance)))
 
 
 @dataclass(frozen=True)

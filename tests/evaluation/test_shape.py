@@ -37,6 +37,18 @@ def test_a_plane_is_found_with_the_deviation_that_it_states() -> None:
     assert np.std(tilts) == pytest.approx(np.mean(stated), rel=0.3)
 
 
+@pytest.mark.parametrize("degrees", [0.0, 0.05, 5.0])
+def test_the_band_of_a_tilt_holds_it_also_where_a_plane_faces_the_camera(degrees: float) -> None:
+    """Two directions tilt such a plane, and an angle is never below zero."""
+    rng, points, inside = np.random.default_rng(3), _tilted(degrees), []
+    for _ in range(200):
+        noisy = points * (1 + rng.normal(0, 0.3, SHAPE) / points[2])
+        fit = fit_plane(noisy[:, ::2, ::2].reshape(3, -1).T, np.full(points[2, ::2, ::2].size, 0.3))
+        assert fit is not None
+        inside.append(abs(fit.tilt_deg - degrees) <= 1.96 * fit.tilt_std_deg)
+    assert np.mean(inside) > 0.91
+
+
 def test_what_stands_out_does_not_tilt_the_plane() -> None:
     points = _tilted(0.0).reshape(3, -1).T.copy()
     points[:300] *= 0.98
