@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.analysis.band_noise import correlation_of
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs, region_spectrum
 from dsl_core.io.result.annotations_file import Annotations
@@ -25,6 +26,12 @@ def require_spectra(result: xr.Dataset) -> None:
     if "reflectance" not in result:
         raise DecodeError("The result contains depth only. Reconstruct the scan with spectra.")
     wavelengths_of(result)
+
+
+def correlation_of_bands(result: xr.Dataset) -> Floats:
+    """How the bands (bands, bands) of a result with spectra err together, as `correlation_of` tells it."""
+    std, flags = (result[name].values if name in result else None for name in ("reflectance_std", "flags"))
+    return correlation_of(result["wavelength_nm"].values, result["reflectance"].values, std, flags)
 
 
 def masks_of_marks(marks: Annotations, shape: tuple[int, int]) -> dict[str, Mask]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from dsl_core.analysis.classification import Classification
 from dsl_core.analysis.colours import USUAL, Colour, colours_of
-from dsl_core.analysis.places import Floats, masks_of_marks, spectra_of_masks
+from dsl_core.analysis.places import Floats, correlation_of_bands, masks_of_marks, spectra_of_masks
 from dsl_core.errors import DecodeError, StoreError
 from dsl_core.evaluation.report.curves import spectrum_curve
 from dsl_core.evaluation.report.pictures import Key, ReportPicture, png_uri
@@ -66,9 +66,10 @@ def session_content(
             if known.any()
         ]
         colours: list[Colour] = []
+        together = correlation_of_bands(result)
         for name, spectrum in spectra.items():
             try:
-                colours += colours_of({name: spectrum}, bands)
+                colours += colours_of({name: spectrum}, bands, correlation=together)
             except DecodeError as error:
                 missing.append(str(error))
         colours.sort(key=lambda each: USUAL.index(each.light))

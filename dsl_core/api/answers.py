@@ -142,12 +142,13 @@ def colours(
     import xarray as xr
 
     from dsl_core.analysis.colours import colours_of
-    from dsl_core.analysis.places import spectra_of_masks
+    from dsl_core.analysis.places import correlation_of_bands, spectra_of_masks
 
     require_picture(result)
     result, lights = with_axes(result), _names_of_lights(lights)
     spectra = spectra_of_masks(result, masks_of(result, pins))
-    found = colours_of(spectra, result["wavelength_nm"].values, lights, reference)
+    nm, together = result["wavelength_nm"].values, correlation_of_bands(result)
+    found = colours_of(spectra, nm, lights, reference, together)
     shape = (len(lights), len(spectra))
     over = ("light", "place")
     variables: dict[str, Any] = {

@@ -294,7 +294,7 @@ def colours(
 ) -> None:
     """Colours of places under several lights: L*a*b* and CIEDE2000, each with its deviation."""
     from dsl_core.analysis.colours import HEADER, USUAL, colours_of
-    from dsl_core.analysis.places import spectra_of_masks
+    from dsl_core.analysis.places import correlation_of_bands, spectra_of_masks
     from dsl_core.io.export.table import export_table
     from dsl_core.io.result.result_file import load_result
 
@@ -303,7 +303,8 @@ def colours(
     check_targets([] if table is None else [table], overwrite=force)
     result = load_result(path)
     spectra = spectra_of_masks(result, _masks(path, result, pins, at))
-    found = colours_of(spectra, result["wavelength_nm"].values, light or USUAL, reference)
+    nm, together = result["wavelength_nm"].values, correlation_of_bands(result)
+    found = colours_of(spectra, nm, light or USUAL, reference, together)
     rows = [each.cells for each in found]
     shown = [[f"{v:.2f}" if isinstance(v, float) else v or "" for v in row] for row in rows]
     output.table(HEADER, shown)

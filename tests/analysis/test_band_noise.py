@@ -1,7 +1,7 @@
 import numpy as np
 
-from dsl_core.analysis.band_noise import OWN_SHARE, band_correlation, usual_correlation
-from tests.cases.chart_cube import chart_cube
+from dsl_core.analysis.band_noise import OWN_SHARE, band_correlation, correlation_of, usual_correlation
+from tests.cases.chart_cube import NM, chart_cube
 
 
 def test_the_correlation_of_bands_is_found_from_neighbouring_pixels() -> None:
@@ -23,6 +23,25 @@ def test_few_pixels_tell_nothing_and_what_is_usual_can_be_inverted() -> None:
         usual = usual_correlation(bands_nm)
         assert np.linalg.eigvalsh(usual)[0] >= OWN_SHARE * 0.99
         assert np.allclose(np.diag(usual), 1)
+
+
+def test_pixels_without_noise_of_their_own_tell_nothing() -> None:
+    """Their errors are in common, or deviations are stated of a cube that was made without noise."""
+    cube = chart_cube()
+    still = np.moveaxis(cube.spectra[cube.material], -1, 0).astype(np.float32)
+    assert band_correlation(still, cube.std, cube.flags == 0) is None
+    np.testing.assert_array_equal(correlation_of(NM, still, cube.std, cube.flags), usual_correlation(NM))
+    np.testing.assert_array_equal(correlation_of(NM, still, None), usual_correlation(NM))
+
+
+def test_bands_that_no_pixel_has_leave_the_others_as_they_are() -> None:
+    cube = chart_cube()
+    gaps = cube.reflectance.copy()
+    gaps[[4, 9]] = np.nan
+    found, known = correlation_of(NM, gaps, cube.std, cube.flags), ~np.isin(np.arange(len(NM)), [4, 9])
+    whole = correlation_of(NM, cube.reflectance, cube.std, cube.flags)
+    np.testing.assert_allclose(found[np.ix_(known, known)], whole[np.ix_(known, known)], atol=0.05)
+    assert np.isfinite(found).all()
 
 
 def test_the_usual_correlation_goes_by_wavelength_and_not_by_number() -> None:

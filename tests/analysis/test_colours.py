@@ -3,11 +3,14 @@ import math
 import numpy as np
 import pytest
 
+import dsl_core as dsl
 from dsl_core.analysis.colours import ILLUMINANTS, colours_of, lab_of, lights_for, xyz_weights
 from dsl_core.analysis.session_report import colour_table
 from dsl_core.errors import DecodeError
 from dsl_core.optics.charts import chart_reflectance
 from dsl_core.optics.colour import delta_e_2000, hold_colour
+from tests.cases.chart_cube import NM as CHART_NM
+from tests.cases.chart_cube import chart_cube, chart_result
 from tests.cases.colour_science import colour_library
 
 NM = np.arange(430.0, 661.0, 5.0)
@@ -57,6 +60,23 @@ def test_bands_that_err_together_make_a_colour_less_sure() -> None:
         for c in (np.eye(len(NM)), np.ones((len(NM),) * 2))
     )
     assert together.lab_std[0] > 3 * lone.lab_std[0]
+
+
+@pytest.mark.parametrize("smooth", [0.0, 1.2, 3.0])
+def test_the_band_of_a_lightness_holds_it_however_bands_err_together(smooth: float) -> None:
+    """Noisy scans are smoothed over more bands than the usual ones; a result tells by how many."""
+    cube = chart_cube(count=2, smooth=smooth)
+    result = chart_result(count=2)
+    result["reflectance"].values[:, :-1] = cube.reflectance[:, :-1]
+    places = [(x, y) for y in (3, 7, 11, 19, 23, 27) for x in range(2, 58, 5)]
+    found = dsl.colours(result, {f"{x} {y}": (x, y) for x, y in places}, "D65")
+    weights = xyz_weights(CHART_NM, "D65")
+    inside = []
+    for x, y in places:
+        true = lab_of(cube.spectra[cube.material[y, x]], weights)
+        one = found.sel(place=f"{x} {y}", light="D65")
+        inside.append(abs(one["lab"][0] - true[0]) < 1.96 * one["lab_std"][0])
+    assert 0.9 < np.mean(inside) <= 1
 
 
 def test_a_difference_of_colours_without_deviations_has_none() -> None:

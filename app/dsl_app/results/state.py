@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.spectrum import Floats, Pixel, Spectrum, spectrum_of_pixel
+from dsl_core.analysis.band_noise import correlation_of
 from dsl_core.analysis.transforms import Transform
 from dsl_core.evaluation.similarity import Likeness
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -229,6 +230,7 @@ class ResultsState:
         self.graph: Value[IntensityGraph | None] = Value(None)
         self.library: Value[Library | None] = Value(None)
         self.opened: Event[Path] = Event()
+        self._correlation: tuple[ResultArrays, NDArray[np.float64]] | None = None
 
     @property
     def saved_result(self) -> ResultArrays | None:
@@ -251,6 +253,15 @@ class ResultsState:
         if self.is_begun.value:
             return "The spectra are still being computed."
         return "This result has depth only. Reconstruct the scan with spectra to see them."
+
+    def band_correlation(self, result: ResultArrays) -> NDArray[np.float64]:
+        """How the bands (bands, bands) of the open result with spectra err together, learned once."""
+        if self._correlation is None or self._correlation[0] is not result:
+            names = ("reflectance_std", "flags")
+            std, flags = (result.known(name) for name in names)
+            found = correlation_of(result.wavelengths_nm, result["reflectance"], std, flags)
+            self._correlation = result, found
+        return self._correlation[1]
 
     @property
     def selected_mark(self) -> Mark | None:

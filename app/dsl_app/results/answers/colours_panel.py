@@ -102,7 +102,9 @@ class ColoursPanel(QWidget):
             if len(mean) == len(bands) and (known.all() or light in lights_for(bands[known])):
                 unknown = np.full(len(bands), np.nan)
                 spectra[name] = np.asarray(mean, float), unknown if std is None else np.asarray(std, float)
-        return colours_of(spectra, bands, (light,), reference if reference in spectra else None)
+        known_reference = reference if reference in spectra else None
+        together = self._state.band_correlation(result)
+        return colours_of(spectra, bands, (light,), known_reference, together)
 
     def copy_all(self) -> None:
         """Copy the colours under all lights."""

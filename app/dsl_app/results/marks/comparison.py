@@ -5,11 +5,11 @@ from __future__ import annotations
 from html import escape
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.spectrum import number_text
 from dsl_app.shared.theme import Theme
-from dsl_core.analysis.band_noise import usual_correlation
 from dsl_core.errors import DslError
 from dsl_core.evaluation.marks import distance_between, largest_difference
 from dsl_core.evaluation.spectral import SpectrumComparison, compare
@@ -30,7 +30,7 @@ def comparison_html(state: ResultsState, theme: Theme) -> str:
     return (
         region_table(chosen, state.band.value, theme)
         + difference_table(chosen, shown, theme)
-        + comparison_table(chosen, shown, result.band_width_nm, theme)
+        + comparison_table(chosen, shown, state, result, theme)
         + distance_table(chosen, shown, result, theme)
     )
 
@@ -82,16 +82,19 @@ def difference_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
     return _table(head, rows, theme)
 
 
-def comparison_table(chosen: Mark, others: list[Mark], width_nm: float | None, theme: Theme) -> str:
-    """A spectrum compared with every reference, or a reference with every spectrum.
+def comparison_table(
+    chosen: Mark, others: list[Mark], state: ResultsState, result: ResultArrays, theme: Theme
+) -> str:
+    """A spectrum compared with every reference, or a reference with every spectrum of a result.
 
-    Each as measured, and with a free scale factor for the spectrum. Bands are ``width_nm`` wide.
+    Each as measured, and with a free scale factor for the spectrum.
     """
     rows = []
     for mark in others:
         measured, reference = (mark, chosen) if chosen.curve is not None else (chosen, mark)
         if measured.curve is None and reference.curve is not None:
-            rows += _compared(mark.name, measured, reference.curve, width_nm, theme)
+            together = state.band_correlation(result)
+            rows += _compared(mark.name, measured, reference.curve, together, result.band_width_nm, theme)
     if rows:
         rows.append(f"<tr><td colspan='4'>{_ABOUT}</td></tr>")
     return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00"], rows, theme)
@@ -107,12 +110,16 @@ _ABOUT = (
 
 
 def _compared(
-    name: str, measured: Mark, curve: SpectralCurve, width_nm: float | None, theme: Theme
+    name: str,
+    measured: Mark,
+    curve: SpectralCurve,
+    together: NDArray[np.float64],
+    width_nm: float | None,
+    theme: Theme,
 ) -> list[str]:
     """The rows of one comparison, which begin with the name of what is compared with."""
     name, spectrum = escape(name), measured.spectrum
     try:
-        together = usual_correlation(spectrum.nm)
         found = compare(spectrum.mean, spectrum.nm, curve, measured.band_std, together, width_nm)
     except DslError as error:
         return [f"<tr><td>{name}</td><td colspan='3'>{escape(str(error))}</td></tr>"]
