@@ -2,34 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import arrange
-from dsl_core.io.pictures.camera_raw import BITS
-from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of, require_alike
+from dsl_core.io.pictures.candidates import FEWEST, Candidate, candidates, jump_of
 from dsl_core.io.pictures.encoding import guessed_encoding
-from dsl_core.io.pictures.float_scale import FloatScale
 from dsl_core.io.pictures.guessed_parts import guessed_size, is_turned, part_of, untold_width
+from dsl_core.io.pictures.look import Look, has_ending, look_at
 from dsl_core.io.pictures.mapping import Encoding, Mapping
-from dsl_core.io.pictures.picture_file import ARRAYS, LINEAR, bayer_of, load_values
-from dsl_core.model.rig import BayerPattern
-from dsl_core.optics.colour import srgb_decode
+from dsl_core.io.pictures.picture_file import ARRAYS, LINEAR, load_values
+from dsl_core.model.captured_code import Axis
 from dsl_core.patterns.recognition.odd_pictures import lost_after, odd_pairs, same_in_a_row
-from dsl_core.patterns.recognition.probes import Probes, ProbeTaker
 from dsl_core.patterns.recognition.sequence import Recognised, recognise
 from dsl_core.patterns.recognition.stripe_sets import StripeReading
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.words import counted
 
-#: A projector that lights less than this share of the camera's range is as good as off.
-LEAST_LIGHT = 0.02
 #: Readings worse than this make sense, but not much.
 DOUBTFUL = 0.8
 #: Readings worse than this may come from values that are encoded for screens: their stripes look uneven, and
@@ -37,8 +28,6 @@ DOUBTFUL = 0.8
 AS_ENCODED = 0.1
 #: More pictures than this are rarely those of a code alone: 11 digits of columns and of rows have 46.
 MANY = 64
-#: Mean values of the four places of a mosaic differ by at least this ratio, its two greens by less.
-MOSAIC_RATIO, GREEN_RATIO = 1.12, 1.05
 Size = tuple[int, int]
 
 
@@ -50,19 +39,6 @@ class Guess:
     table: tuple[tuple[str, str], ...]
     others: tuple[str, ...]
     asks: str = ""
-
-
-@dataclass(frozen=True)
-class _Look:
-    """What reading all pictures of a candidate showed."""
-
-    probes: Probes
-    decoded: Probes
-    bit_depth: int | None
-    left_aligned: bool
-    full_scale: float | None
-    bayer: BayerPattern | None
-    notes: tuple[str, ...]
 
 
 def guess_mapping(
@@ -90,13 +66,13 @@ def guess_mapping(
         whole = []
     # A folder with a folder for each pose or camera holds many captures of the same kind.
     order = [*single, *whole] if len(names) > 2 and _alike(single) else [*whole, *single]
-    best: tuple[Candidate, _Look, Recognised] | None = None
+    best: tuple[Candidate, Look, Recognised] | None = None
     trouble: StoreError | None = None
-    first: tuple[Candidate, _Look] | None = None
+    first: tuple[Candidate, Look] | None = None
     for number, candidate in enumerate(order):
         progress.report("look at the pictures", number, len(order))
         try:
-            look = _look_at(candidate)
+            look = look_at(candidate)
         except StoreError as error:
             trouble = trouble or error
             continue
@@ -105,18 +81,19 @@ def guess_mapping(
         for picture in candidate.pictures:
             slots.append(None if picture is None else count)
             count += picture is not None
-        found = _recognised(look, tuple(slots))
+        found = _recognised(look, tuple(slots), projector_size_px)
         if found is not None and (best is None or found.misfit < best[2].misfit):
             best = candidate, look, found
         if best is None or best[2].misfit >= DOUBTFUL or _alike_next(order, number, whole):
             continue
-        # Two dark pictures pass for a digit and its inverse, until one of them is left out.
-        if not (best[2].has_odd_pair and any(each in whole for each in order[number + 1 : number + 2])):
+        # Two dark pictures pass for a digit and its inverse, or for black twice, until one is left out.
+        is_doubtful = best[2].has_odd_pair or best[2].has_spare
+        if not (is_doubtful and any(each in whole for each in order[number + 1 : number + 2])):
             break
     if best is not None and best[0] in whole and len(names) > 1:
-        best = _single_instead(best, single) or best
+        best = _single_instead(best, single, projector_size_px) or best
     elif best is not None and len(names) > 1 and not best[2].has_inverses:
-        best = _whole_instead(best, whole) or best
+        best = _whole_instead(best, whole, projector_size_px) or best
     if best is None:
         raise trouble or StoreError(
             f"The pictures of {folder} make no sense as a capture: no order of white, black, stripes and"
@@ -125,7 +102,7 @@ def guess_mapping(
     return _guess_of(folder, *best, projector_size_px, names, encoding)
 
 
-def _advice(tried: Sequence[Candidate], looked_at: tuple[Candidate, _Look] | None) -> str:
+def _advice(tried: Sequence[Candidate], looked_at: tuple[Candidate, Look] | None) -> str:
     """What to do about pictures that make no sense; the first candidate that was looked at may tell."""
     first = next((each.pictures[0] for each in tried if each.pictures[0] is not None), None)
     if first is not None and first.path.suffix.lower() in ARRAYS and first.index is not None:
@@ -155,7 +132,7 @@ def _picture_name(candidate: Candidate, place: int) -> str:
     return picture.path.name if picture.index is None else f"{picture.path.name}[{picture.index}]"
 
 
-def _doubts_of_digits(candidate: Candidate, look: _Look, found: Recognised) -> list[str]:
+def _doubts_of_digits(candidate: Candidate, look: Look, found: Recognised) -> list[str]:
     """Pictures that are no pattern and inverse; raises `StoreError` where the picture of a digit is lost."""
     doubts = []
     for block in found.blocks:
@@ -183,18 +160,20 @@ def _doubts_of_digits(candidate: Candidate, look: _Look, found: Recognised) -> l
     return doubts
 
 
-def _recognised(look: _Look, slots: tuple[int | None, ...]) -> Recognised | None:
+def _recognised(look: Look, slots: tuple[int | None, ...], size_px: Size | None = None) -> Recognised | None:
     """What the pictures show as they are, or as pictures for screens where that makes more sense."""
-    found = recognise(look.probes, slots)
+    columns, rows = ((length - 1).bit_length() for length in size_px or (0, 0))
+    needed: dict[Axis, int] = {"columns": columns, "rows": rows} if size_px else {}
+    found = recognise(look.probes, slots, needed)
     if found is not None and found.misfit_upright < AS_ENCODED:
         return found
-    decoded = recognise(look.decoded, slots)
+    decoded = recognise(look.decoded, slots, needed)
     return min((each for each in (found, decoded) if each), key=lambda each: each.misfit, default=None)
 
 
 def _single_instead(
-    best: tuple[Candidate, _Look, Recognised], single: Sequence[Candidate]
-) -> tuple[Candidate, _Look, Recognised] | None:
+    best: tuple[Candidate, Look, Recognised], single: Sequence[Candidate], size_px: Size | None
+) -> tuple[Candidate, Look, Recognised] | None:
     """The first of several sets that show the same, as those of two cameras do; None for parts of one."""
     # Stripes in one folder and the sinusoids that they count in another belong together.
     if not _alike(single) or len(single) < 2:
@@ -202,10 +181,11 @@ def _single_instead(
     found = []
     for each in single[:2]:
         try:
-            look = _look_at(each)
+            look = look_at(each)
         except StoreError:
             return None
-        read = None if None in each.pictures else _recognised(look, tuple(range(len(each.pictures))))
+        slots = tuple(range(len(each.pictures)))
+        read = None if None in each.pictures else _recognised(look, slots, size_px)
         if read is None or read.misfit > DOUBTFUL:
             return None
         found.append((each, look, read))
@@ -216,17 +196,17 @@ def _single_instead(
 
 
 def _whole_instead(
-    best: tuple[Candidate, _Look, Recognised], whole: Sequence[Candidate]
-) -> tuple[Candidate, _Look, Recognised] | None:
+    best: tuple[Candidate, Look, Recognised], whole: Sequence[Candidate], size_px: Size | None
+) -> tuple[Candidate, Look, Recognised] | None:
     """All pictures where they hold the inverses of a set, as names that end in "inv" do; else None."""
     for each in whole:
         if None in each.pictures:
             continue
         try:
-            look = _look_at(each)
+            look = look_at(each)
         except StoreError:
             continue
-        read = _recognised(look, tuple(range(len(each.pictures))))
+        read = _recognised(look, tuple(range(len(each.pictures))), size_px)
         if read is not None and read.misfit < DOUBTFUL and _is_split(read, best[2]):
             return each, look, read
     return None
@@ -250,82 +230,10 @@ def _alike_next(order: Sequence[Candidate], number: int, whole: Sequence[Candida
     return following.files == this.files or (following in whole and following.left_out > this.left_out)
 
 
-def _look_at(candidate: Candidate) -> _Look:
-    taker, bits, most, fractions = ProbeTaker(), 0, 0.0, FloatScale()
-    first: NDArray[Any] | None = None
-    brightest: tuple[float, NDArray[np.float32]] | None = None
-    colour = is_wide = False
-    for picture in candidate.pictures:
-        if picture is None:
-            continue
-        values = load_values(picture)
-        first = values if first is None else first
-        require_alike(picture, values, first)
-        colour = colour or values.ndim == 3
-        most = max(most, float(values.max()))
-        if values.dtype.kind == "f":
-            fractions.add(values)
-        if values.dtype.kind in "ui":
-            bits |= int(np.bitwise_or.reduce(values.ravel()))
-            is_wide = is_wide or values.dtype.itemsize > 1
-        grey = np.asarray(values.mean(axis=2) if values.ndim == 3 else values, np.float32)
-        if brightest is None or grey.mean() > brightest[0]:
-            brightest = float(grey.mean()), grey
-        taker.add(grey)
-    assert brightest is not None
-    stated = bayer_of(next(each for each in candidate.pictures if each is not None))
-    white = fractions.white
-    depth, aligned = _depth_of(bits, most, is_wide, white is not None) if stated is None else (BITS, False)
-    scale = white or float((1 << (16 if aligned else depth or 8)) - 1)
-    probes = taker.finish(max(scale, 1e-9))
-    decoded = taker.finish(max(scale, 1e-9), srgb_decode)
-    if probes.range_share < LEAST_LIGHT:
-        raise StoreError(
-            f"The pictures of {candidate.name} change by {probes.range_share:.1%} of their range: no"
-            " projector's light is seen. Give the folder of a capture, or expose longer."
-        )
-    notes = ["JPEG has changed values near edges of stripes"] if _has(candidate, {".jpg", ".jpeg"}) else []
-    bayer = stated or (None if colour else _bayer_of(brightest[1]))
-    if bayer is not None and stated is None:
-        notes.append(
-            f"neighbouring pixels look like a colour mosaic; {bayer} is assumed (red and blue unsure)"
-        )
-    return _Look(probes, decoded, depth, aligned, white, bayer, tuple(notes))
-
-
-def _depth_of(bits: int, most: float, is_wide: bool, floats: bool) -> tuple[int | None, bool]:
-    """Bit depth and whether values are at the upper end of 16 bits, from all bits that occur."""
-    if floats:
-        return 16, False
-    if not is_wide:
-        return None, False
-    for depth in (10, 12):
-        if most < 2**depth:
-            return depth, False
-    for depth in (10, 12):
-        if bits % 2 ** (16 - depth) == 0:
-            return depth, True
-    return 16, False
-
-
-def _bayer_of(picture: NDArray[np.float32]) -> BayerPattern | None:
-    means = np.array([[picture[r::2, c::2].mean() for c in (0, 1)] for r in (0, 1)])
-    if means.min() <= 0 or means.max() / means.min() < MOSAIC_RATIO:
-        return None
-    ratios = [max(a, b) / min(a, b) for a, b in ((means[0, 1], means[1, 0]), (means[0, 0], means[1, 1]))]
-    if min(ratios) > GREEN_RATIO:
-        return None
-    return "RGGB" if ratios[0] < ratios[1] else "GRBG"
-
-
-def _has(candidate: Candidate, suffixes: Collection[str]) -> bool:
-    return any(p is not None and p.path.suffix.lower() in suffixes for p in candidate.pictures)
-
-
 def _guess_of(
     folder: Path,
     candidate: Candidate,
-    look: _Look,
+    look: Look,
     found: Recognised,
     size_px: Size | None,
     names: Sequence[str],
@@ -362,7 +270,7 @@ def _guess_of(
         left_aligned=look.left_aligned,
         full_scale=look.full_scale,
     )
-    if encoding is None and _has(candidate, LINEAR):
+    if encoding is None and has_ending(candidate, LINEAR):
         encoding = "linear"
     if encoding is None:
         mapping, doubts_of_values = guessed_encoding(folder, mapping)

@@ -22,6 +22,7 @@ from dsl_core.patterns.recognition.phase_sets import PhaseReading, turns_per_num
 from dsl_core.patterns.recognition.probes import Probes
 from dsl_core.patterns.recognition.sequence import Block
 from dsl_core.patterns.recognition.stripe_sets import StripeReading, numbers_of
+from dsl_core.words import counted
 
 #: Sizes of projectors, the commonest first.
 COMMON_PX = (
@@ -103,9 +104,8 @@ def part_of(
         return _phases(axis, block, block.reading, blocks, size_px, probes)
     if block.kind == "skip":
         count = len(block.slots)
-        return Skipped(count=count), [
-            f"{count} pictures next to the stripes show no pattern and are not used"
-        ]
+        show = counted(count, "picture next to the stripes shows", "pictures next to the stripes show")
+        return Skipped(count=count), [f"{show} no pattern and {'is' if count == 1 else 'are'} not used"]
     return (WhitePicture() if block.kind == "white" else BlackPicture()), []
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -31,6 +31,11 @@ BRIGHTEST, DARKEST = 0.75, 0.25
 #: What speaks against numbers that fall, and against white or black in the middle of digits: both are rare,
 #: and a camera that sees part of a projector may take its coarsest digit for white and black.
 UNLIKELY = 0.02
+#: What speaks against white or black that was taken twice, less than against numbers that fall: taken for the
+#: coarsest digit of a Gray code, white and then black turn its numbers round.
+REPEATED = 0.01
+#: White, or black, that was taken twice differs by no more than this share of the range: lamps drift.
+SAME_LIGHT = 0.02
 #: White and black stand at most this far from an end of a sequence, or from each other.
 FROM_END = 2
 #: Splits that are tried, and the share of pictures that must speak for one; what speaking against it costs.
@@ -43,6 +48,7 @@ ODD_PAIR = 0.25
 #: Sinusoids of one period agree with nothing, so that any steps fit them.
 UNTESTED = 0.3
 Slots = tuple[int | None, ...]
+Places = tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -102,6 +108,11 @@ class Recognised:
         return any(isinstance(each, StripeReading) and each.inverse != "none" for each in readings)
 
     @property
+    def has_spare(self) -> bool:
+        """Whether pictures show neither a pattern nor the one white and the one black that are used."""
+        return any(block.kind == "skip" for block in self.blocks)
+
+    @property
     def has_odd_pair(self) -> bool:
         """Whether a clear pattern and its inverse do not go against each other."""
         return any(
@@ -115,22 +126,40 @@ class Recognised:
         )
 
 
-def recognise(probes: Probes, slots: Slots) -> Recognised | None:
-    """The reading of a sequence of pictures that makes most sense, or None when none does."""
+def recognise(probes: Probes, slots: Slots, most_bits: Mapping[Axis, int] | None = None) -> Recognised | None:
+    """The reading of a sequence of pictures that makes most sense, or None when none does.
+
+    ``most_bits`` are the digits that the columns and rows of the projector need, where its size is known.
+    """
     # Many guesses of where white and black are leave the same runs.
-    blocks_of: BlocksOf = cache(lambda axis, run: _axis_blocks(probes, axis, run))
+    blocks_of: BlocksOf = cache(lambda axis, run: _axis_blocks(probes, axis, run, most_bits or {}))
+    level = {i: float(probes.across.of(p).mean()) for i, p in enumerate(slots) if p is not None}
     best: Recognised | None = None
-    for white, black in _lights(probes, slots):
-        found = _without_lights(probes, slots, white, black, blocks_of)
-        if found is not None and (best is None or found.misfit < best.misfit - 1e-6):
-            best = found
+    for white, black in _lights(level, len(slots)):
+        for repeated in dict.fromkeys(((), _repeated(level, white, black))):
+            found = _without_lights(probes, slots, white, black, repeated, blocks_of)
+            if found is not None and (best is None or found.misfit < best.misfit - 1e-6):
+                best = found
     return best
 
 
-def _lights(probes: Probes, slots: Slots) -> Iterator[tuple[int | None, int | None]]:
+def _repeated(level: Mapping[int, float], white: int | None, black: int | None) -> Places:
+    """Places of pictures that show white or black once more, as before and after a code, or for each axis."""
+    lights = [i for i in (white, black) if i is not None]
+    return tuple(
+        i for i in level if i not in lights and any(is_same_light(level[i], level[k]) for k in lights)
+    )
+
+
+def is_same_light(one: float, other: float) -> bool:
+    """Whether two mean levels may be those of one white, or of one black, that was taken twice."""
+    both_bright, both_dark = min(one, other) > BRIGHT, max(one, other) < DARK
+    return (both_bright or both_dark) and abs(one - other) <= SAME_LIGHT
+
+
+def _lights(level: Mapping[int, float], count: int) -> Iterator[tuple[int | None, int | None]]:
     """Places where white and black may stand, the likeliest first: each is one picture or there is none."""
-    level = {i: float(probes.across.of(p).mean()) for i, p in enumerate(slots) if p is not None}
-    near = [i for i in level if min(i, len(slots) - 1 - i) < FROM_END]
+    near = [i for i in level if min(i, count - 1 - i) < FROM_END]
     whites = sorted((i for i in near if level[i] > BRIGHT), key=lambda i: -level[i])
     blacks = sorted((i for i in near if level[i] < DARK), key=lambda i: level[i])
     whites = whites or [i for i in near if level[i] == max(level.values()) and level[i] > BRIGHTEST]
@@ -142,14 +171,14 @@ def _lights(probes: Probes, slots: Slots) -> Iterator[tuple[int | None, int | No
 
 
 def _without_lights(
-    probes: Probes, slots: Slots, white: int | None, black: int | None, blocks_of: BlocksOf
+    probes: Probes, slots: Slots, white: int | None, black: int | None, repeated: Places, blocks_of: BlocksOf
 ) -> Recognised | None:
     lights = {i for i in (white, black) if i is not None}
-    places = [i for i in range(len(slots)) if i not in lights]
+    places = [i for i in range(len(slots)) if i not in lights and i not in repeated]
     if not places:
         return None
     # Taking white or black for a digit costs more than finding neither.
-    misfit = 0.02 * (2 - len(lights))
+    misfit = 0.02 * (2 - len(lights)) + REPEATED * bool(repeated)
     best: Recognised | None = None
     for runs, doubt in _splits(probes, slots, places):
         coded: list[tuple[int, Block]] = []
@@ -174,6 +203,8 @@ def _without_lights(
             blocks = [*blocks, (white, Block("white", (slots[white],)))]
         if black is not None:
             blocks = [*blocks, (black, Block("black", (slots[black],)))]
+        for run in _runs(repeated):
+            blocks = [*blocks, (run[0], Block("skip", tuple(slots[i] for i in run)))]
         in_order = tuple(block for _, block in sorted(blocks, key=lambda each: each[0]))
         best = Recognised(in_order, total, probes)
     return best
@@ -202,8 +233,13 @@ def _splits(
 
 def _joined(places: Sequence[int]) -> list[Sequence[int]]:
     """Runs of places without white or black between them; two of those are no one run of digits."""
+    return _runs(places) or [places]
+
+
+def _runs(places: Sequence[int]) -> list[Sequence[int]]:
+    """Places in runs of those that follow each other."""
     cuts = [k for k in range(1, len(places)) if places[k] != places[k - 1] + 1]
-    return [places] if not cuts else [places[: cuts[0]], places[cuts[0] :]]
+    return [places[a:b] for a, b in zip([0, *cuts], [*cuts, len(places)], strict=True) if b > a]
 
 
 def _axis_votes(probes: Probes, pictures: Sequence[int | None]) -> NDArray[np.float64]:
@@ -218,7 +254,9 @@ def _axis_votes(probes: Probes, pictures: Sequence[int | None]) -> NDArray[np.fl
     return np.array(votes)
 
 
-def _axis_blocks(probes: Probes, axis: Axis, slots: Sequence[int | None]) -> tuple[list[Block], float]:
+def _axis_blocks(
+    probes: Probes, axis: Axis, slots: Sequence[int | None], most_bits: Mapping[Axis, int]
+) -> tuple[list[Block], float]:
     """Blocks of a run of pictures that code one axis, none if they do not, and what speaks against them."""
     lines = probes.across if axis == "columns" else probes.down
     present = [p for p in slots if p is not None]
@@ -226,6 +264,8 @@ def _axis_blocks(probes: Probes, axis: Axis, slots: Sequence[int | None]) -> tup
     if stripes is not None:
         odd = odd_pairs(lines, slots, stripes)
         found, cost = [Block("stripes", tuple(slots), axis, stripes)], _cost(stripes) + ODD_PAIR * len(odd)
+        # No projector needs such a digit: it is white and black that were taken once more.
+        cost += UNLIKELY * (stripes.bits > most_bits.get(axis, stripes.bits))
     else:
         found, cost = [], np.inf
     if len(present) < len(slots):

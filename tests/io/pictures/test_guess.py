@@ -17,11 +17,10 @@ from dsl_core.io.pictures.candidates import Candidate
 from dsl_core.io.pictures.guess import (
     AS_ENCODED,
     _alike_next,
-    _bayer_of,
-    _depth_of,
     _recognised,
     guess_mapping,
 )
+from dsl_core.io.pictures.look import _bayer_of, _depth_of
 from dsl_core.io.pictures.mapping import BlackPicture, PhasePictures, StripePictures, WhitePicture
 from dsl_core.model.captured_code import Phases, Stripes
 from tests.cases.foreign_captures import PROJECTOR, frames, write
@@ -357,7 +356,7 @@ def test_values_that_make_sense_as_they_are_are_not_taken_for_those_of_a_screen(
 ) -> None:
     misfits = {"as they are": as_they_are, "decoded": decoded}
 
-    def recognise(probes: str, _slots: tuple[int, ...]) -> object:
+    def recognise(probes: str, *_: object) -> object:
         misfit = misfits[probes]
         return None if misfit is None else SimpleNamespace(misfit=misfit, misfit_upright=misfit, of=probes)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.model.captured_code import CapturedCode, Phases, Stripes
+from dsl_core.model.captured_code import Axis, CapturedCode, Phases, Stripes
 from dsl_core.patterns.captured_code import captured_levels
 from dsl_core.patterns.recognition.phase_sets import PhaseReading
 from dsl_core.patterns.recognition.probes import ProbeTaker
-from dsl_core.patterns.recognition.sequence import Recognised, Slots, recognise
+from dsl_core.patterns.recognition.sequence import Recognised, Slots, is_same_light, recognise
 from dsl_core.patterns.recognition.stripe_sets import StripeReading
 from tests.cases.foreign_captures import PROJECTOR, frames, scene
 
@@ -22,11 +22,13 @@ Pictures = list[NDArray[np.uint16]]
 Arrange = Callable[[Pictures, NDArray[np.uint16], NDArray[np.uint16]], Pictures]
 
 
-def _recognised(pictures: Pictures, slots: Slots | None = None) -> Recognised | None:
+def _recognised(
+    pictures: Pictures, slots: Slots | None = None, most_bits: Mapping[Axis, int] | None = None
+) -> Recognised | None:
     taker = ProbeTaker()
     for picture in pictures:
         taker.add(picture)
-    return recognise(taker.finish(255.0), slots or tuple(range(len(pictures))))
+    return recognise(taker.finish(255.0), slots or tuple(range(len(pictures))), most_bits)
 
 
 @pytest.mark.parametrize("rows", [1, 4])
@@ -156,10 +158,66 @@ def test_one_fringe_is_not_taken_for_another_axis() -> None:
 
 def test_lights_beside_stripes_are_no_steps_of_a_sinusoid() -> None:
     pictures, white, black = frames([("columns", Stripes(bits=7))])
-    found = _recognised([*pictures, white, black, white])
+    dim = np.asarray(0.95 * white, np.uint16)
+    found = _recognised([*pictures, white, black, dim])
     assert found is not None
     assert [(kind, count) for kind, _, count in found.content] == [("stripes", 14), ("skip", 3)]
     assert _stripes(found, "columns").bits == 7
+
+
+#: Where white (W) and black (B) were taken besides the pictures of columns and rows.
+@pytest.mark.parametrize("order", ["WBcWB", "BWcBW", "WBcWBr", "cWBrWB", "WWBBc", "cWBW"])
+@pytest.mark.parametrize(("code", "inverse"), [("gray", True), ("binary", False)])
+def test_white_and_black_taken_twice_are_no_coarsest_digit(
+    order: str, code: Literal["gray", "binary"], inverse: bool
+) -> None:
+    digits = Stripes(code=code, bits=7, inverse=inverse)
+    sets = {letter: frames([(axis, digits)])[0] for letter, axis in (("c", "columns"), ("r", "rows"))}
+    seen, pictures = scene(), []
+    for number, letter in enumerate(order):
+        level = np.full((96, 128), float(letter == "W"))
+        pictures += sets.get(letter) or [seen.picture(level, 700 + number)]
+    found = _recognised(pictures, most_bits={"columns": 7, "rows": 7})
+    assert found is not None
+    for axis in ("columns", "rows")[: 1 + ("r" in order)]:
+        reading = _stripes(found, axis)
+        assert (reading.bits, reading.rises) == (7, True)
+    kinds = [block.kind for block in found.blocks]
+    assert kinds.count("white") == kinds.count("black") == 1
+    spare = sum(len(block.slots) for block in found.blocks if block.kind == "skip")
+    assert spare == sum(map(order.count, "WB")) - 2
+
+
+def test_white_before_a_gray_code_turns_no_numbers_round_where_no_projector_is_known() -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    found = _recognised([white, black, *pictures, white, black])
+    reading = _stripes(found, "columns")
+    assert (reading.bits, reading.rises) == (7, True)
+
+
+def test_the_coarsest_digit_of_half_a_projector_is_no_white_taken_twice() -> None:
+    whole = scene()
+    half = replace(whole, columns=64 + 0.45 * whole.columns)
+    code = CapturedCode(column_sets=(Stripes(bits=7),))
+    levels = [captured_levels(code, PROJECTOR, index) for index in range(14)]
+    levels += [np.ones((96, 128)), np.zeros((96, 128))]
+    pictures = [half.picture(each, k, 8) for k, each in enumerate(levels)]
+    for most_bits in (None, {"columns": 7, "rows": 7}):
+        reading = _stripes(_recognised(pictures, most_bits=most_bits), "columns")
+        assert (reading.bits, reading.rises) == (7, True)
+        assert reading.numbers[0] >= 64
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        (0.99, 0.975, True), (0.99, 0.965, False), (0.03, 0.015, True), (0.03, 0.005, False),
+        (0.5, 0.5, False), (0.9, 0.91, False), (0.1, 0.09, False),
+    ],
+)  # fmt: skip
+def test_lights_are_the_same_where_a_lamp_may_have_drifted(one: float, other: float, same: bool) -> None:
+    assert is_same_light(one, other) is same
+    assert is_same_light(other, one) is same
 
 
 def test_a_digit_that_is_blurred_to_grey_is_no_light_that_is_left_out() -> None:
