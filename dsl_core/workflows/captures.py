@@ -67,7 +67,8 @@ def load_mapping(path: Path) -> Mapping:
 def sensor_of(scan: PictureScan) -> Sensor:
     """What is assumed of a camera that nobody described: the noise of a common one, no black level."""
     common = common_sensor(scan.bit_depth)
-    return common.model_copy(update={"bayer": scan.mapping.bayer or "MONO"})
+    found = {"bayer": scan.mapping.bayer or "MONO", "saturation_dn": scan.limit_dn}
+    return common.model_copy(update=found)
 
 
 def common_sensor(bit_depth: int) -> Sensor:

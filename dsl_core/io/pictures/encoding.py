@@ -20,7 +20,7 @@ def encoding_of(source: PictureScan, fewer: FrameSource | None = None) -> tuple[
     ``fewer`` are the same pictures with fewer pixels, if these are enough. Raises `StoreError` when a picture
     cannot be read.
     """
-    found = linearity_of(fewer or source, 2**source.bit_depth - 1, 0.0)
+    found = linearity_of(fewer or source, source.full_scale_dn, 0.0)
     return found, _advice(found, source)
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.camera_raw import BITS
 from dsl_core.io.pictures.candidates import Candidate, require_alike
-from dsl_core.io.pictures.float_scale import FloatScale
-from dsl_core.io.pictures.picture_file import bayer_of, load_values
+from dsl_core.io.pictures.picture_file import bayer_of, holds_sensor_values, load_values
+from dsl_core.io.pictures.value_scale import ValueScale
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour import srgb_decode
 from dsl_core.patterns.recognition.probes import Probes, ProbeTaker
@@ -39,7 +39,7 @@ class Look:
 
 def look_at(candidate: Candidate) -> Look:
     """Read all pictures of a candidate; raises `StoreError` where they are no capture of one camera."""
-    taker, bits, most, fractions = ProbeTaker(), 0, 0.0, FloatScale()
+    taker, bits, most, ends = ProbeTaker(), 0, 0.0, ValueScale()
     first: NDArray[Any] | None = None
     brightest: tuple[float, NDArray[np.float32]] | None = None
     colour = is_wide = False
@@ -51,8 +51,7 @@ def look_at(candidate: Candidate) -> Look:
         require_alike(picture, values, first)
         colour = colour or values.ndim == 3
         most = max(most, float(values.max()))
-        if values.dtype.kind == "f":
-            fractions.add(values)
+        ends.add(values)
         if values.dtype.kind in "ui":
             bits |= int(np.bitwise_or.reduce(values.ravel()))
             is_wide = is_wide or values.dtype.itemsize > 1
@@ -60,9 +59,10 @@ def look_at(candidate: Candidate) -> Look:
         if brightest is None or grey.mean() > brightest[0]:
             brightest = float(grey.mean()), grey
         taker.add(grey)
+    assert first is not None
     assert brightest is not None
     stated = bayer_of(next(each for each in candidate.pictures if each is not None))
-    white = fractions.white
+    white = ends.white if first.dtype.kind == "f" else None
     depth, aligned = _depth_of(bits, most, is_wide, white is not None) if stated is None else (BITS, False)
     scale = white or float((1 << (16 if aligned else depth or 8)) - 1)
     probes = taker.finish(max(scale, 1e-9))
@@ -80,7 +80,18 @@ def look_at(candidate: Candidate) -> Look:
         notes.append(
             f"neighbouring pixels look like a colour mosaic; {bayer} is assumed (red and blue unsure)"
         )
+    if white is None and stated is None and holds_sensor_values(first.dtype):
+        white = _limit_of(ends.limit, aligned, depth)
+        if white is not None:
+            notes.append(f"values end at {white:g}: pixels that reach it are taken to be saturated")
     return Look(probes, decoded, depth, aligned, white, bayer, tuple(notes))
+
+
+def _limit_of(limit: float | None, aligned: bool, depth: int | None) -> float | None:
+    """Where values end, None if it is at the largest number of their bits or unknown."""
+    unused = 2 ** (16 - depth) - 1 if aligned and depth else 0
+    largest = 2**16 - 1 - unused if aligned else 2 ** (depth or 8) - 1
+    return None if limit is None or limit >= largest else limit
 
 
 def _depth_of(bits: int, most: float, is_wide: bool, floats: bool) -> tuple[int | None, bool]:

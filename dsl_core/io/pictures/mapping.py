@@ -110,7 +110,8 @@ class Mapping(Record):
     ``missing`` are places (from 0) in that order of which there is no picture. Colour pictures become
     ``grey``, the mean of their channels, or one channel; a ``bayer`` mosaic stays as it is. Values have
     ``bit_depth`` bits, at the upper end of 16 where ``left_aligned``; ``full_scale`` is the white of
-    floating-point arrays, and of whole numbers of more than 16 bits. Values with ``encoding`` "srgb" are made
+    floating-point arrays, and of whole numbers of more than 16 bits, and the value as stored at which others
+    end if that is not the largest of their bits. Values with ``encoding`` "srgb" are made
     linear in light, channel by channel.
     """
 

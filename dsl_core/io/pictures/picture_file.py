@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import MissingPackageError, StoreError
 from dsl_core.io.pictures import array_file, camera_raw, open_exr
-from dsl_core.io.pictures.float_scale import SPARKS
 from dsl_core.io.pictures.heads import Head, heads_of
 from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
+from dsl_core.io.pictures.value_scale import SPARKS
 from dsl_core.io.png_parts import declares_too_much
 from dsl_core.io.reading import read_bounded, require_plain
 from dsl_core.model.conditions import BayerPattern
@@ -128,6 +128,11 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
     return values
 
 
+def holds_sensor_values(kind: np.dtype[Any]) -> bool:
+    """Whether numbers are as a sensor gives them, not fractions or sums, whose white is any number."""
+    return kind.kind in "ui" and kind.itemsize <= 2
+
+
 def bayer_of(picture: Picture) -> BayerPattern | None:
     """The mosaic that a file itself states, None where its format states none; raises `StoreError`."""
     if picture.path.suffix.lower() not in camera_raw.SUFFIXES:
@@ -140,11 +145,14 @@ def load_mosaic(picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[n
 
     Pictures in sRGB become linear frames of `DECODED_BITS`.
     """
-    values = load_values(picture, mapping.raw)
+    return as_mosaic(load_values(picture, mapping.raw), picture, mapping, bit_depth)
+
+
+def as_mosaic(values: NDArray[Any], picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[np.uint16]:
+    """The same of the values of a picture."""
     if mapping.encoding == "srgb":
         return np.asarray(np.rint(_one_channel(_decoded(values, picture, mapping), mapping)), np.uint16)
-    # Whole numbers of more than 16 bits, such as sums of exposures, have a white of their own as well.
-    is_scaled = values.dtype.kind == "f" or values.dtype.itemsize > 2
+    is_scaled = not holds_sensor_values(values.dtype)
     if values.ndim == 3:
         values = _one_channel(values, mapping)
     if is_scaled and mapping.full_scale is not None:

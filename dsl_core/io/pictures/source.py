@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,14 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.pictures.arrange import Arrangement, arrange
 from dsl_core.io.pictures.mapping import Mapping
-from dsl_core.io.pictures.picture_file import DECODED_BITS, Picture, load_mosaic, load_values
+from dsl_core.io.pictures.picture_file import (
+    DECODED_BITS,
+    Picture,
+    as_mosaic,
+    holds_sensor_values,
+    load_mosaic,
+    load_values,
+)
 from dsl_core.model.plan import CapturePlan, NoSpectral, Setting, Shot
 from dsl_core.words import readable
 
@@ -26,6 +34,7 @@ class PictureScan:
     """A `FrameSource` that reads the pictures of a mapping when they are requested.
 
     Where white or black was not captured, the brightest or darkest value of each pixel stands for it.
+    ``limit_dn`` is where values end, None if at the largest number of ``bit_depth``.
     """
 
     root: Path
@@ -33,6 +42,12 @@ class PictureScan:
     arrangement: Arrangement
     plan: CapturePlan
     bit_depth: int
+    limit_dn: int | None = None
+
+    @property
+    def full_scale_dn(self) -> int:
+        """The value of a saturated pixel."""
+        return 2**self.bit_depth - 1 if self.limit_dn is None else self.limit_dn
 
     @property
     def made_up(self) -> tuple[str, ...]:
@@ -93,4 +108,15 @@ def open_pictures(root: Path, mapping: Mapping) -> PictureScan:
     )
     stored_bits = 8 if first.dtype.itemsize == 1 else 16
     bits = DECODED_BITS if mapping.encoding == "srgb" else mapping.bit_depth or stored_bits
-    return PictureScan(root, mapping, found, plan, bits)
+    return PictureScan(
+        root, mapping, found, plan, bits, _limit_dn(found.frames[0], first.dtype, mapping, bits)
+    )
+
+
+def _limit_dn(picture: Picture, kind: np.dtype[Any], mapping: Mapping, bit_depth: int) -> int | None:
+    """Where the values of frames end, DN, by the mapping; None if at the largest number of their bits."""
+    most = 2 ** (16 if mapping.left_aligned else mapping.bit_depth or 8 * kind.itemsize) - 1
+    if mapping.full_scale is None or not holds_sensor_values(kind) or mapping.full_scale >= most:
+        return None
+    end = np.full((1, 1), mapping.full_scale, kind)
+    return max(int(as_mosaic(end, picture, mapping, bit_depth)[0, 0]), 1)

@@ -148,6 +148,18 @@ def test_bit_depth_and_alignment_are_read_from_the_values(tmp_path: Path) -> Non
     assert (mapping.bit_depth, mapping.left_aligned) == (12, True)
 
 
+def test_where_values_end_below_their_bits_is_told(tmp_path: Path, gray: Pictures) -> None:
+    values = [np.minimum(p.astype(float) * 1.6 * 64, 16383).astype(np.uint16) for p in gray]
+    noise = np.random.default_rng(4)
+    named = {
+        f"{i:02d}.png": np.minimum(p + noise.integers(0, 64, p.shape), 16383).astype(np.uint16)
+        for i, p in enumerate(values)
+    }
+    mapping = guess_mapping(write(tmp_path, named, 16), PROJECTOR).mapping
+    assert (mapping.bit_depth, mapping.full_scale) == (16, 16383.0)
+    assert any("values end at 16383: pixels that reach it" in each for each in mapping.unsure)
+
+
 def test_stripes_count_the_periods_of_a_sinusoid(tmp_path: Path) -> None:
     sets: list[tuple[str, Stripes | Phases]] = [
         ("columns", Stripes(bits=4, inverse=False, unit_px=8)),

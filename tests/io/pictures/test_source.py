@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.pictures.mapping import BlackPicture, Mapping, StripePictures, WhitePicture
+from dsl_core.io.pictures.mapping import BlackPicture, Mapping, PhasePictures, StripePictures, WhitePicture
 from dsl_core.io.pictures.source import open_pictures
+from dsl_core.workflows.captures import sensor_of
 
 RNG = np.random.default_rng(1)
 FRAMES = [RNG.integers(0, 4000, (3, 5)).astype(np.uint16) for _ in range(4)]
@@ -75,3 +77,24 @@ def test_a_fingerprint_tells_pictures_and_mappings_apart_but_no_names(tmp_path: 
     assert (
         print_of != open_pictures(one, mapping.model_copy(update={"projector_size_px": (3, 6)})).fingerprint()
     )
+
+
+@pytest.mark.parametrize(
+    ("stated", "limit", "saturated"),
+    [
+        ({"bit_depth": 16, "full_scale": 16383}, 16383, 16383),
+        ({"bit_depth": 14}, None, 16383),
+        ({"bit_depth": 12, "left_aligned": True, "full_scale": 60000}, 3750, 3750),
+        ({"bit_depth": 16, "full_scale": 65535}, None, 65535),
+        ({"bit_depth": 16, "full_scale": 32767, "encoding": "srgb"}, 14027, 14027),
+    ],
+)
+def test_pixels_are_saturated_where_values_end(
+    tmp_path: Path, stated: dict[str, Any], limit: int | None, saturated: int
+) -> None:
+    white = np.full((8, 8), 9000, np.uint16)
+    folder_of(tmp_path, *[white] * 4)
+    mapping = Mapping(parts=(PhasePictures(fringes=(1.0,), steps=4),), projector_size_px=(64, 48), **stated)
+    found = open_pictures(tmp_path, mapping)
+    assert (found.limit_dn, found.full_scale_dn) == (limit, saturated)
+    assert sensor_of(found).full_scale_dn == saturated
