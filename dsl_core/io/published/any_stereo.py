@@ -34,8 +34,8 @@ _PARTS = (
     "camera matrix", "camera distortion", "projector matrix", "projector distortion",
     "rotation", "translation",
 )  # fmt: skip
-#: A rotation vector that is longer is none in radians.
-_MOST_TURN_RAD = 6.3
+#: A rotation vector that is longer is none in radians: no turn is more than half of one, either way.
+_MOST_TURN_RAD = 1.001 * np.pi
 _CORRECT = {
     "camera": "Correct --camera-size, or calibrate with that size.",
     "projector": "Correct --projector, or calibrate with that size.",
@@ -199,7 +199,7 @@ def _rotation(parts: Parts, path: Path) -> NDArray[np.float64]:
     turn_rad = float(np.linalg.norm(values))
     if turn_rad > _MOST_TURN_RAD:
         raise CalibrationError(
-            f"{path}: {parts.names['rotation']} is a rotation of {turn_rad:.1f} rad, more than a turn."
+            f"{path}: {parts.names['rotation']} is a rotation of {turn_rad:.1f} rad, more than half a turn."
             " Give a rotation vector in radians or a matrix; angles about axes are not understood."
         )
     return np.asarray(cv2.Rodrigues(values)[0], np.float64)

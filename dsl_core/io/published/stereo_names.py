@@ -64,7 +64,7 @@ class Parts:
     Matrices are (3, 3), distortions flat, ``turn`` (3, 3) or (3,), ``shift`` (3,). ``is_inverse`` says that a
     name tells the pose to lead from the projector to the camera. ``both_placed`` names the poses of camera
     and projector where a file has one of each, so that neither leads from one device to the other. ``rivals``
-    are two names of one part that have different values.
+    are two names of one part that have different values. ``has_transposed``: of a matrix of a lens.
     """
 
     values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
@@ -73,6 +73,7 @@ class Parts:
     is_inverse: bool = False
     both_placed: tuple[str, str] | None = None
     rivals: tuple[str, str] | None = None
+    has_transposed: bool = False
 
     def find(self, numbers: Numbers, words: str, sizes: set[int]) -> str | None:
         """The name of a part that is one of these words, no side result and the least nested."""
@@ -194,6 +195,7 @@ def _add_matrix(found: Parts, part: str, name: str, values: NDArray[np.float64])
     matrix = _upright(values)
     # MATLAB counts pixels from 1.
     transposed = not np.array_equal(matrix, values.reshape(3, 3))
+    found.has_transposed |= transposed
     if transposed or "cameraparameters" in _plain(name):
         matrix = matrix - np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
         how = "transposed, with pixels from 1" if transposed else "with pixels from 1"
@@ -218,6 +220,8 @@ def _add_pose(found: Parts, numbers: Numbers) -> None:
                 values = values.reshape(3, 3) if values.size == 9 else values.ravel()
                 # MATLAB multiplies rows from the left.
                 turned = values.T if _plain(name).endswith("rotationofcamera2") else values
+                if turned is values and values.size == 9 and found.has_transposed:
+                    found.taken.append(f"{name} is not transposed, unlike the matrices of the lenses")
                 found.add(part, name, turned)
                 found.is_inverse |= is_inverse
     if "rotation" in found.values or "translation" in found.values:

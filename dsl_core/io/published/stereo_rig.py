@@ -7,12 +7,9 @@ import numpy as np
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.any_stereo import FoundStereo
 from dsl_core.io.published.curves import FoundCurves
-from dsl_core.io.published.stereo_words import doubts
+from dsl_core.io.published.stereo_words import FARTHEST, NEAREST, doubts
 from dsl_core.model.rig import LEAST_BASELINE_MM, Provenance, Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
-
-#: Depths between these multiples of the distance of camera and projector are believed.
-NEAREST, FARTHEST = 0.5, 50.0
 
 
 def lenses_on(

@@ -260,7 +260,8 @@ def test_a_pose_of_one_matrix_leads_where_its_name_says(tmp_path: Path, name: st
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"R": [1, 17, -1]}, "R is a rotation of 17.1 rad, more than a turn"),
+        ({"R": [1, 17, -1]}, "R is a rotation of 17.1 rad, more than half a turn"),
+        ({"R": [1, 3, -0.5]}, "R is a rotation of 3.2 rad, more than half a turn"),
         ({"cam_K": K + np.diag([12.0, 0], 1)}, "cam_K is not a matrix of fx, fy, cx, cy"),
         ({"camera_resolution": [640, 512]}, "is for a camera of 640 x 512 px, not 1280 x 1024 px"),
     ],
@@ -305,7 +306,8 @@ def test_a_principal_point_is_doubted_from_the_edge_of_the_picture_on(
     lenses = {"cam_K": K.copy(), "proj_K": P.copy()}
     lenses["cam_K"][:2, 2], lenses["proj_K"][:2, 2] = camera, projector
     found = load_any_stereo(as_json(tmp_path / "c.json", PLAIN | lenses), (1280, 1024), (1024, 768))
-    assert [each.split("'")[0].removeprefix("the ") for each in found.doubts] == doubted
+    told = [each for each in found.doubts if "principal point" in each]
+    assert [each.split("'")[0].removeprefix("the ") for each in told] == doubted
 
 
 def test_a_camera_of_ros_alone_is_no_pair(tmp_path: Path) -> None:

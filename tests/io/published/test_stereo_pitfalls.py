@@ -12,6 +12,7 @@ import pytest
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.any_stereo import FoundStereo, load_any_stereo
+from dsl_core.io.published.stereo_words import lit_at, placed
 
 K = np.array([[1200.0, 0, 640], [0, 1210, 512], [0, 0, 1]])
 P = np.array([[1900.0, 0, 500], [0, 1905, 700], [0, 0, 1]])
@@ -200,3 +201,47 @@ def test_a_distortion_that_cannot_be_read_is_not_left_out(tmp_path: Path, given:
 def test_words_about_a_distortion_are_none(tmp_path: Path) -> None:
     said = {"distortion_model": "plumb_bob", "note": "dist measured", "cam_date": None}
     assert read(tmp_path, {**PLAIN, **said}).stereo.camera.distortion == (0,) * 5
+
+
+UP = np.diag([1.0, -1, -1])
+
+
+@pytest.mark.parametrize(
+    ("turn", "shift", "is_doubted"),
+    [
+        (R, T, False),
+        (R, -T, False),
+        (R.T, T, False),
+        (UP @ R, UP @ T, True),
+        ([0.5, -2.0, 0.1], T, True),
+        (np.asarray(cv2.Rodrigues(np.array([0.0, np.pi, 0]))[0]), T, True),
+    ],
+)
+def test_a_projector_that_lights_nothing_the_camera_sees_is_doubted(
+    tmp_path: Path, turn: Any, shift: Any, is_doubted: bool
+) -> None:
+    found = read(tmp_path, {**LENSES, "R": turn, "T": shift})
+    told = [each for each in found.doubts if "light what the camera sees" in each]
+    assert len(told) == is_doubted
+    assert ("lights up to 0% of" in placed(found.stereo)) == is_doubted
+
+
+def test_where_light_meets_the_camera_follows_from_lenses_and_pose(tmp_path: Path) -> None:
+    lens = np.array([[1000.0, 0, 499.5], [0, 1000, 499.5], [0, 0, 1]])
+    sizes = {"image_size": [1000, 1000], "projector_size": [1000, 1000]}
+    turned = np.asarray(cv2.Rodrigues(np.array([0.0, np.arctan(0.25), 0]))[0])
+    apart = {"cam_K": lens, "proj_K": lens, **sizes, "T": -turned @ [200.0, 0, 0], "R": turned}
+    share, depth_mm = lit_at(read(tmp_path, apart).stereo)
+    # The axes cross at 800 mm; the slant of 14 degrees lets the fields meet best before that.
+    assert 0.85 < share <= 1
+    assert 400 < depth_mm < 1000
+    parallel = {**apart, "T": [-200.0, 0, 0], "R": np.eye(3)}
+    share, depth_mm = lit_at(read(tmp_path, parallel).stereo)
+    assert share == 1.0
+    assert depth_mm > 200 / (0.5 / 15)
+
+
+def test_a_rotation_next_to_transposed_lenses_is_told_as_not_transposed(tmp_path: Path) -> None:
+    turned = {**PLAIN, "cam_K": K.T, "proj_K": P.T}
+    assert "R is not transposed, unlike the matrices of the lenses" in read(tmp_path, turned).taken
+    assert not any("unlike" in each for each in read(tmp_path, PLAIN).taken)
