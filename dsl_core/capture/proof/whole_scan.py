@@ -12,6 +12,7 @@ from dsl_core.capture.proof.code.first_light import flickers, light_of_pairs
 from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.ends import sentences_of_ends
+from dsl_core.capture.proof.lasting.light_noise import light_noise
 from dsl_core.capture.proof.lasting.pair_places import pair_places
 from dsl_core.capture.proof.lasting.sharp_edges import sharp_edges
 from dsl_core.capture.proof.lasting.soft_stripes import soft_stripes
@@ -96,6 +97,7 @@ class WholeScan:
                 with_colours,
             )
         said = [self._sharp_edges(), *said, self._flicker(), self._code_colours(), self._pair_places()]
+        said.append(self._light_noise())
         return [each for each in (*said, self._soft_stripes()) if each]
 
     def _sharp_edges(self) -> str:
@@ -122,6 +124,13 @@ class WholeScan:
             f" {max(light.values()):.2f} times the light of white, up and down. Expose for whole periods of"
             " the mains and of the projector's LEDs, keep lamps of the room off, and scan again."
         )
+
+    def _light_noise(self) -> str:
+        known = self._known
+        if known.calibration is None or not known.knows_light:
+            return ""
+        found = light_noise(known.code_pairs(), known.noise, known.raster)
+        return "" if found is None else found.sentence
 
     def _code_colours(self) -> str:
         known = self._known
