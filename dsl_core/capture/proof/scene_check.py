@@ -140,6 +140,29 @@ class SceneCheck:
         )
         return not self.levels
 
+    def see_mixed(self, take: Callable[[Shot, bool], Mosaic]) -> str:
+        """That the first black holds light of white that is gone once it is shown for longer; or "".
+
+        All pictures then have something of those before them. ``take`` is that of `see_settled`, and what is
+        found is kept as ``unsettled``. Raises what ``take`` raises.
+        """
+        known = self._known
+        ends = known.ends(known.first)
+        if self.unsettled or ends is None:
+            return ""
+        white, black = (known.shots[known.places[role, 0]] for role in ("white", "black"))
+        full_dn = known.noise.sensor.full_scale_dn
+
+        def change(mosaic: Mosaic) -> float:
+            return change_of_light(known.raster.take(mosaic), ends, "black", full_dn)
+
+        longer = change(take(black, True))
+        if longer > -LEAST_CHANGE["black"]:
+            return ""
+        take(white, False)
+        self.unsettled = unsettled_sentence("black", 0.0, longer, change(take(black, False)))
+        return self.unsettled
+
     def see_settled(self, again: Shot, pixels: Mosaic, take: Callable[[Shot, bool], Mosaic]) -> None:
         """Where white or black, taken ``again`` as a sentinel, has changed, see if that is a habit.
 

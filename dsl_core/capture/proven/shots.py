@@ -20,7 +20,9 @@ from dsl_core.capture.proven.doubted import MOST_UNTOLD, DoubtedShots
 from dsl_core.capture.proven.lateness import Lateness
 from dsl_core.capture.proven.wrong_pictures import (
     PictureError,
+    displaced,
     has_begun_before,
+    said_of_corrected,
     what_to_do,
     why_control_differs,
 )
@@ -62,17 +64,15 @@ class ProvenShots:
         self._has_seen_first = False
         #: What is wrong with light and places of the first code, as soon as that is known.
         self._light = ""
+        #: That pictures hold something of those before them: the first ones say nothing of later ones then.
+        self._mixed = ""
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
 
     @property
     def note(self) -> str:
         """What a person should know at the end, as sentences with a space before them; empty if nothing."""
-        found = []
-        if self.corrected:
-            what = "1 was" if self.corrected == 1 else f"{self.corrected} were"
-            found.append(f"{what} captured again, because a picture did not show its pattern.")
-            found += ["Everything was captured twice, since pictures came one late."] if self._is_late else []
+        found = said_of_corrected(self.corrected, self._is_late)
         found += [] if self._proof is None or not self._proof.unproven else [self._proof.unproven]
         return "".join(f" {each}" for each in (*found, *self._known_wrong))
 
@@ -341,12 +341,20 @@ class ProvenShots:
         # Calibrations scan through filters.
         found = [light_sentence(proof.whole.code_sum(), None), *proof.whole.lasting(with_colours=False)]
         self._light = " ".join(each for each in found if each)
-        if self._light:
-            _log.warning("%s", self._light)
-        for first in pictures:
+        if self._light and self._sees_mixed():
+            self._light = ""  # what else is odd comes of that
+        for each in self._known_wrong:
+            _log.warning("%s", each)
+        for first in () if self._mixed else pictures:
             self._require_place(first, proof)
-        if not self._only_repeats:
+        if not self._only_repeats and not self._mixed:
             self._see_levels(proof)
+
+    def _sees_mixed(self) -> bool:
+        """Whether pictures hold something of those before them, as black, captured again, shows."""
+        if not self._mixed and self._proof is not None and not self._only_repeats:
+            self._mixed = self._proof.scene.see_mixed(self._pixels)
+        return bool(self._mixed)
 
     def _see_levels(self, proof: FrameProof) -> None:
         """See that white at half its level is as bright as the calibration says, or keep what is wrong.
@@ -369,18 +377,14 @@ class ProvenShots:
             return
         if not proof.scene.is_displaced(first, self._again(first).seen):
             return
-        raise PictureError(
-            f"{describe_shot(first).capitalize()}, captured once more, is displaced from where it was:"
-            " projector, camera or target moved while the code was captured, or the projector corrects or"
-            f" scales its picture. {self._explain().sentence or ADVICE} {self._next_step.then} Frame"
-            f" {first.number} is kept.",
-            tuple(proof.scene.code_after(first)),
-            has_changed=True,
-        )
+        reason = f"{self._explain().sentence or ADVICE} {self._next_step.then}"
+        raise displaced(first, reason, proof.scene.code_after(first))
 
     def _explain(self) -> Explanation:
         """What has changed since the scan began; nothing where that does not show."""
         try:
+            if self._sees_mixed():
+                return Explanation(self._mixed, is_of_all=True)
             return self._diagnosis.explain(lambda shot: self._again(shot).seen)
         except DeviceError as error:
             _log.warning("No pictures could be taken to see what has changed: %s", error)

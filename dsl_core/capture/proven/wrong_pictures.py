@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from dsl_core.capture.diagnosis import Explanation
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.errors import DeviceError
-from dsl_core.model.plan import Shot
+from dsl_core.model.plan import Shot, describe_shot
 
 #: Lines that are wrong like this while white, black and code look as at first have lost light of their own.
 DIM = (Verdict.DARK, Verdict.EXPOSURE)
@@ -100,3 +102,23 @@ def why_control_differs(is_mirrored: bool) -> str:
         "Projector, camera, light or target have changed since. Check that the projector follows, that no"
         " automatic mode is on, and that nothing has moved."
     )
+
+
+def displaced(first: Shot, reason: str, again: Collection[Shot]) -> PictureError:
+    """That a picture of the code, captured once more, is elsewhere, so that others are taken ``again``."""
+    return PictureError(
+        f"{describe_shot(first).capitalize()}, captured once more, is displaced from where it was: projector,"
+        " camera or target moved while the code was captured, or the projector corrects or scales its"
+        f" picture. {reason} Frame {first.number} is kept.",
+        tuple(again),
+        has_changed=True,
+    )
+
+
+def said_of_corrected(count: int, is_late: bool) -> list[str]:
+    """Sentences on so many shots that were taken again, in a scan that took every picture twice or not."""
+    if not count:
+        return []
+    what = "1 was" if count == 1 else f"{count} were"
+    found = [f"{what} captured again, because a picture did not show its pattern."]
+    return [*found, "Everything was captured twice, since pictures came one late."] if is_late else found

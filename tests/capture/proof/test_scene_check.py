@@ -120,3 +120,25 @@ def test_no_other_sentinel_is_asked_whether_it_settles() -> None:
 
     check.see_settled(SHOTS[13], counts(900).reshape(18, 32), take)
     assert (check.unsettled, taken) == ("", [])
+
+
+@pytest.mark.parametrize(
+    ("first", "longer", "again", "is_mixed"),
+    [(320, 300, 320, True), (320, 300, 300, False), (300, 300, 300, False)],
+    ids=["mixed", "lamp of the room", "calm"],
+)
+def test_pictures_that_hold_those_before_them_are_told_by_the_first_black(
+    first: int, longer: int, again: int, is_mixed: bool
+) -> None:
+    scan: Any = known()
+    scan.kept = {10: counts(1000), 11: counts(first)}
+    check, taken = SceneCheck(scan), list[tuple[str, bool]]()
+
+    def take(shot: Shot, is_longer: bool) -> np.ndarray:
+        taken.append((shot.role, is_longer))
+        return counts(longer if is_longer else again).reshape(18, 32)
+
+    said = check.see_mixed(take)
+    assert said == check.unsettled
+    assert said.startswith("Black, captured after white, holds 2.9% of the light of white") is is_mixed
+    assert taken == [("black", True), ("white", False), ("black", False)][: 1 if first == 300 else 3]

@@ -52,6 +52,7 @@ class Bench:
         self.unproven = ""
         #: How often white at half its level is compared, and what that says.
         self.whites_seen, self.levels = list[bool](), ""
+        self.mixed = ""
         self.recalled: dict[int, str] = {}
         self.chosen: tuple[Shot, ...] = (SHOTS[0], SHOTS[4])
         #: So many of the next controls are wrong, whatever is the matter.
@@ -147,6 +148,9 @@ class Bench:
     def see_settled(self, white: Shot, pixels: object, take: Callable[[Shot, bool], object]) -> None:
         for is_longer in self.settling:
             take(white, is_longer)
+
+    def see_mixed(self, take: Callable[[Shot, bool], object]) -> str:
+        return self.mixed
 
     def whites(self) -> tuple[Shot, Shot] | None:
         return (SHOTS[10], replace(SHOTS[10], level=0.5)) if self.whites_seen else None
@@ -297,6 +301,18 @@ def test_levels_are_looked_at_where_an_earlier_run_took_all_lines(
     bench.displaced, bench.whites_seen = [False] if is_there else [], [True]
     bench.shots.conclude(is_proven)
     assert [each[:2] for each in bench.taken] == asked
+
+
+def test_pictures_mixed_with_those_before_them_are_the_reason_whatever_the_first_ones_say() -> None:
+    bench = Bench(late)
+    bench.mixed, bench.of_ends = "Exposures begin early.", ["Black is grey."]
+    bench.displaced, bench.whites_seen = [True], [False]
+    bench.cause = "The light of the room has changed."
+    with pytest.raises(PictureError, match=r"after 4 exposures: .* Exposures begin early\.") as caught:
+        bench.shots.take(LINE)
+    assert "Black is grey" not in str(caught.value)
+    assert "room" not in str(caught.value)
+    assert bench.whites_seen == [False]
 
 
 def test_a_rig_that_only_repeats_is_not_asked_for_other_levels() -> None:

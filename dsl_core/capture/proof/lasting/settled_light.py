@@ -61,7 +61,8 @@ def unsettled_sentence(role: str, once: float, longer: float, again: float) -> s
         )
     return (
         f"Black, captured after white, holds {gone:.1%} of the light of white, and not when it is shown for"
-        " longer: camera or projector keep something of the picture before (afterglow, image lag, noise"
-        " reduction over time). Lines are off by as much. Switch that off, or let the projector settle for"
-        " longer (its latency), and scan again."
+        " longer: exposures begin before the picture has changed (the projector takes longer than its latency"
+        " says), or camera or projector keep something of the picture before (afterglow, image lag, noise"
+        " reduction over time). Lines are off by as much. State a longer latency of the projector, or switch"
+        " that off, and scan again."
     )
