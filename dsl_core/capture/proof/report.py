@@ -83,7 +83,8 @@ class SeenFrames:
         lit = proof.whole.lit_again()
         # A window covers white, and changes its colour, where it came into the picture.
         whites = (proof.whole.white_again(), proof.whole.colour_again()) if lit is None else (lit,)
-        light += [each.sentence for each in (*whites, proof.whole.single_pixels()) if each is not None]
+        others = (proof.whole.single_pixels(), proof.whole.calm_lines())
+        light += [each.sentence for each in (*whites, *others) if each is not None]
         light += [each.sentence for each in proof.whole.local_sums()]
         return ProofReport(judged, together(wrong), sum(not proof.is_told(s) for s in untold), tuple(light))
 

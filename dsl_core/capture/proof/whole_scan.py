@@ -12,10 +12,11 @@ from dsl_core.capture.proof.code.first_light import flickers, light_of_pairs
 from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.ends import sentences_of_ends
-from dsl_core.capture.proof.lasting.light_noise import light_noise
+from dsl_core.capture.proof.lasting.light_noise import is_stated, light_noise, noise_times
 from dsl_core.capture.proof.lasting.pair_places import pair_places
 from dsl_core.capture.proof.lasting.sharp_edges import sharp_edges
 from dsl_core.capture.proof.lasting.soft_stripes import soft_stripes
+from dsl_core.capture.proof.lines.calm_lines import CalmLines, calm_lines
 from dsl_core.capture.proof.lines.line_sum import LineSum, line_sum
 from dsl_core.capture.proof.lines.local_sum import LocalSum, local_sum
 from dsl_core.capture.proof.white_again import WhiteAgain, white_again
@@ -53,6 +54,17 @@ class WholeScan:
         settings = range(len(known.plan.settings))
         found = (local_sum(known.plan, n, known.kept, lit, known.noise, known.raster) for n in settings)
         return [each for each in found if each is not None]
+
+    def calm_lines(self) -> CalmLines | None:
+        """Lines that have less noise than the calibration says, as only a camera's processing makes them."""
+        known = self._known
+        if known.calibration is None or not known.knows_light:
+            return None
+        times = noise_times(known.code_pairs(), known.noise, known.raster)
+        if times is None or not is_stated(times):
+            return None
+        own = [s for s in known.shots if (s.role, s.setting) == ("spectral", known.first)]
+        return calm_lines(own, known.kept, known.noise)
 
     def lit_again(self) -> LitAgain | None:
         """The first black, captured again, that is as bright as white somewhere, and was not at first."""

@@ -52,17 +52,28 @@ class LightNoise:
 
 
 def light_noise(pairs: Mapping[int, Pair], noise: Noise, raster: Raster) -> LightNoise | None:
-    """Noise of light by the ``pairs`` of a code, rasters by their number; None if it is as stated.
+    """Noise of light by the ``pairs`` of a code, as `noise_times`; None if it is as stated, or not known."""
+    times = noise_times(pairs, noise, raster)
+    return LightNoise(times) if times is not None and not is_stated(times) else None
 
-    Every pair adds up to the same light, so that sums differ by noise alone. None as well where there is too
-    little light to tell.
+
+def is_stated(times: float) -> bool:
+    """Whether noise that is so many times the one stated may be that."""
+    return 1 / OTHER <= times <= OTHER
+
+
+def noise_times(pairs: Mapping[int, Pair], noise: Noise, raster: Raster) -> float | None:
+    """Variance of light over the one stated, by the ``pairs`` of a code, rasters by their number.
+
+    Every pair adds up to the same light, so that sums differ by noise alone. None where there is too little
+    light to tell, or pairs disagree.
     """
     chosen = [pairs[number] for number in sorted(pairs)[:PAIRS]]
     found = [times for one, other in pairwise(chosen) if (times := _times(one, other, noise, raster))]
     if len(found) < PAIRS - 1 or min(found) < NO_NOISE or max(found) > AGREE * min(found):
         return None
-    is_other = min(found) > OTHER or max(found) < 1 / OTHER
-    return LightNoise(float(np.median(found))) if is_other else None
+    # All of them are beyond what a self-test leaves open, or none is.
+    return 1.0 if min(found) <= OTHER and max(found) >= 1 / OTHER else float(np.median(found))
 
 
 def _times(one: Pair, other: Pair, noise: Noise, raster: Raster) -> float | None:
