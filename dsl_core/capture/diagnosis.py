@@ -25,6 +25,7 @@ from dsl_core.capture.proof.again.white_tiles import (
     said_of_shade,
 )
 from dsl_core.capture.proof.lasting.black_light import lit_black
+from dsl_core.capture.proof.lasting.black_values import below_level
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
 from dsl_core.capture.put_back import ADVICE
@@ -33,6 +34,7 @@ from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.conditions import COLOUR_NAMES
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Sensor, colour_sites
+from dsl_core.optics.seen_noise import DARKER
 
 Mosaic = NDArray[np.uint16]
 
@@ -140,7 +142,12 @@ class Diagnosis:
     def explain_picture(self, pixels: Mosaic) -> Explanation:
         """What a wrong picture, raw mosaic (rows, columns), shows by itself where references do not."""
         black = self._kept.get(self._shots["black"].index, pixels) if self._shots else pixels
-        ends = ends_early(pixels, self._sensor.given(black))
+        sensor = self._sensor.given(black)
+        dark_dn = float(np.quantile(pixels, DARKER))
+        low = below_level(f"Its darkest pixels are at {dark_dn:.0f} DN", dark_dn, sensor)
+        if low:
+            return Explanation(low, is_of_all=True, seen="it is darker than the camera's black level")
+        ends = ends_early(pixels, sensor)
         return Explanation(ends, is_of_all=True, seen="its brightest pixels are cut off" if ends else "")
 
 

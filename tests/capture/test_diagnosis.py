@@ -147,6 +147,17 @@ def test_a_plan_without_a_code_has_no_references() -> None:
     assert Diagnosis(plan, SensorWatch(plan, SENSOR, 12)).explain(never) == Explanation()
 
 
+@pytest.mark.parametrize(("bits_lost", "is_low"), [(0, False), (2, True), (4, True)])
+def test_a_picture_below_the_black_level_says_that_the_pixel_format_is_another(
+    bits_lost: int, is_low: bool
+) -> None:
+    plan = CapturePlan(code=NoCode(), spectral=ScanLines())
+    picture = (pictures().code >> bits_lost).astype(np.uint16)
+    found = Diagnosis(plan, SensorWatch(plan, SENSOR, 12)).explain_picture(picture)
+    assert ("below the camera's black level of 260 DN" in found.sentence) is is_low
+    assert found.is_of_all
+
+
 @pytest.fixture(scope="module")
 def scene() -> RenderedScene:
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(step_px=5), code_settings=(0,))

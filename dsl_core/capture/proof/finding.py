@@ -60,7 +60,8 @@ _REMEDY = {
     Verdict.LATE: "Let the projector settle for longer (its latency), and check that it follows.",
     Verdict.REPEATED: "Restart the camera.",
     Verdict.SWAPPED: "Check how camera and projector are synchronised.",
-    Verdict.TORN: "Let the projector settle for longer (its latency), or expose for whole frames of it.",
+    Verdict.TORN: "Let the projector settle for longer (its latency), or expose for whole frames of it; keep"
+    " messages and windows out of its picture, and people out of its way.",
     Verdict.EXPOSURE: "Switch automatic exposure and gain of the camera off, and check the lamp.",
     Verdict.SATURATED: "Check exposure and gain of the camera, and the light of the room.",
     Verdict.DARK: "Check that the projector is on, that nothing stands in its way, and that the exposure is"

@@ -11,6 +11,7 @@ from dsl_core.capture.proof.code.code_sum import CodeSum, code_sum
 from dsl_core.capture.proof.code.first_light import flickers, light_of_pairs
 from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.judging.known import Known
+from dsl_core.capture.proof.lasting.coarse_values import coarse_values
 from dsl_core.capture.proof.lasting.ends import sentences_of_ends
 from dsl_core.capture.proof.lasting.light_noise import is_stated, light_noise, noise_times
 from dsl_core.capture.proof.lasting.pair_places import pair_places
@@ -65,6 +66,15 @@ class WholeScan:
             return None
         own = [s for s in known.shots if (s.role, s.setting) == ("spectral", known.first)]
         return calm_lines(own, known.kept, known.noise)
+
+    def coarse_values(self) -> str:
+        """That values come in steps larger than the camera's noise, as a sentence; empty if they do not."""
+        known = self._known
+        ends = known.ends(known.first)
+        if known.calibration is None or ends is None:
+            return ""
+        pairs = known.code_pairs().values()
+        return coarse_values((*ends, *(each for pair in pairs for each in pair)), known.noise.stated)
 
     def lit_again(self) -> LitAgain | None:
         """The first black, captured again, that is as bright as white somewhere, and was not at first."""

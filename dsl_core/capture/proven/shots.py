@@ -338,8 +338,8 @@ class ProvenShots:
             return
         self._has_seen_first = True
         self._doubted.end_code()
-        # Calibrations scan through filters.
-        found = [light_sentence(proof.whole.code_sum(), None), *proof.whole.lasting(with_colours=False)]
+        found = [proof.whole.coarse_values(), light_sentence(proof.whole.code_sum(), None)]
+        found += proof.whole.lasting(with_colours=False)  # calibrations scan through filters
         self._light = " ".join(each for each in found if each)
         if self._light and self._sees_mixed():
             self._light = ""  # what else is odd comes of that

@@ -39,8 +39,9 @@ _FINE = (
 #: The same of pairs of the code that add up to something else than others, whenever they are captured.
 _NOT_ADDED_UP = (
     "It looks the same each time, and nothing shows that anything moved: the camera's values may not be"
-    " proportional to the light of each pixel alone. Switch gamma, compression, sharpening and noise"
-    " reduction of the camera off, and store raw values. If that is not why:"
+    " proportional to the light of each pixel alone, or the projector smooths or sharpens edges of its"
+    " picture. Switch gamma, compression, sharpening and noise reduction of the camera off, and store raw"
+    " values; switch sharpness, noise reduction and scaling of the projector off. If that is not why:"
 )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Counts, Raster
+from dsl_core.model.rig import Sensor
 
 #: Light only adds to black. What the level may have fallen by since its calibration, as a share and DN.
 BELOW, LEAST_DN = 0.1, 3.0
@@ -15,14 +16,19 @@ NOISY = 0.9
 
 def low_black(black: Counts, noise: Noise) -> str:
     """That black, a raster, lies below the sensor's black level, as a sentence; empty if it does not."""
-    level_dn, found_dn = noise.sensor.black_level_dn, float(black.mean(dtype=np.float64))
+    found_dn = float(black.mean(dtype=np.float64))
+    return below_level(f"Black is at {found_dn:.0f} DN on average", found_dn, noise.sensor)
+
+
+def below_level(what: str, found_dn: float, sensor: Sensor) -> str:
+    """That counts lie below a sensor's black level, as a sentence that begins with ``what``; empty if not."""
+    level_dn = sensor.black_level_dn
     if found_dn > level_dn - max(BELOW * level_dn, LEAST_DN):
         return ""
     return (
-        f"Black is at {found_dn:.0f} DN on average, below the camera's black level of {level_dn:.0f} DN by"
-        " its self-test, though light only adds to it: bit depth, pixel format or offset of the camera were"
-        " changed since, and every value is off. Set them as they were, or repeat the self-test; then scan"
-        " again."
+        f"{what}, below the camera's black level of {level_dn:.0f} DN by its self-test, though light only"
+        " adds to it: bit depth, pixel format or offset of the camera were changed since, and every value is"
+        " off. Set them as they were, or repeat the self-test; then scan again."
     )
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.code.code_pairs import Pair
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Floats, Raster
+from dsl_core.optics.sensor import step_of
 from dsl_core.solve.robust import robust_std
 
 #: Variance over the one stated, up and down, from which on a gain is another; self-tests leave a tenth open.
@@ -69,23 +70,33 @@ def noise_times(pairs: Mapping[int, Pair], noise: Noise, raster: Raster) -> floa
     light to tell, or pairs disagree.
     """
     chosen = [pairs[number] for number in sorted(pairs)[:PAIRS]]
-    found = [times for one, other in pairwise(chosen) if (times := _times(one, other, noise, raster))]
+    if len(chosen) < PAIRS:
+        return None
+    # Pictures of less bits than the camera's have the noise of rounding, too.
+    values = np.bincount(np.concatenate([each for pair in chosen for each in pair]))
+    rounding = np.float32(step_of(values) ** 2 / 12)
+    found = [
+        times for one, other in pairwise(chosen) if (times := _times(one, other, noise, raster, rounding))
+    ]
     if len(found) < PAIRS - 1 or min(found) < NO_NOISE or max(found) > AGREE * min(found):
         return None
     # All of them are beyond what a self-test leaves open, or none is.
     return 1.0 if min(found) <= OTHER and max(found) >= 1 / OTHER else float(np.median(found))
 
 
-def _times(one: Pair, other: Pair, noise: Noise, raster: Raster) -> float | None:
-    """Variance of the difference of two sums over the one stated; None where light says too little."""
+def _times(one: Pair, other: Pair, noise: Noise, raster: Raster, rounding: np.float32) -> float | None:
+    """Variance of the difference of two sums over the one stated; None where light says too little.
+
+    Each picture has the variance of ``rounding`` besides.
+    """
     stated = Noise(noise.stated)
     every = (*one, *other)
-    variance = np.sum([stated.variance(each) for each in every], axis=0)
+    variance = np.sum([stated.variance(each) for each in every], axis=0) + len(every) * rounding
     low, high = np.minimum.reduce(every), np.maximum.reduce(every)
     used = (high.astype(np.float32) - low > LIT_SIGMAS * np.sqrt(variance)) & (
         high < stated.sensor.full_scale_dn
     )
-    used &= len(every) * stated.least_variance < (1 - BY_LIGHT) * variance
+    used &= len(every) * (stated.least_variance + rounding) < (1 - BY_LIGHT) * variance
     if int(used.sum()) < FEWEST * FEWEST_PARTS:
         return None
     before, now = (np.add(*pair, dtype=np.float32) for pair in (other, one))
