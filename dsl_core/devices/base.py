@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DeviceError
+from dsl_core.model.conditions import Mirrored
 from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan
@@ -43,7 +44,8 @@ class Device(ABC):
 class CameraInfo:
     """What a camera is and delivers: the raw mosaic, ``bit_depth`` bits in uint16, right-aligned.
 
-    ``region_px`` is x, y, width, height of the part of the sensor that is read, None for all of it.
+    ``region_px`` is x, y, width, height of the part of the sensor that is read, None for all of it, and
+    ``mirrored`` how the camera turns its picture itself, None for one that does not say.
     """
 
     model: str
@@ -56,6 +58,7 @@ class CameraInfo:
     region_px: tuple[int, int, int, int] | None = None
     binning: int = 1
     gain_db: float = 0.0
+    mirrored: Mirrored | None = None
 
 
 class Camera(Device):

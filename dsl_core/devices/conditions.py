@@ -22,6 +22,7 @@ def conditions_of(camera: CameraInfo, projector: ProjectorInfo) -> CaptureCondit
             gain_db=camera.gain_db,
             bayer=camera.bayer,
             bit_depth=camera.bit_depth,
+            mirrored=camera.mirrored,
         ),
         projector=ProjectorConditions(
             model=projector.model,

@@ -12,6 +12,8 @@ BayerPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG", "MONO"]
 #: Names of the colours of a mosaic, by their number.
 COLOUR_NAMES = ("red", "green", "blue")
 Region = tuple[int, int, int, int]
+#: How a camera turns its picture before it sends it.
+Mirrored = Literal["off", "left to right", "top to bottom", "both ways"]
 
 
 def colour_sites(bayer: str) -> tuple[int, int, int, int]:
@@ -50,7 +52,10 @@ _SAME_PERIOD = 0.01
 
 
 class CameraConditions(Record):
-    """A camera and how it is read out; ``region_px`` is x, y, width, height on the sensor, None for all."""
+    """A camera and how it is read out; ``region_px`` is x, y, width, height on the sensor, None for all.
+
+    ``mirrored`` says how it turns its picture itself, None where it does not say.
+    """
 
     model: str
     serial: str
@@ -60,6 +65,7 @@ class CameraConditions(Record):
     gain_db: float = 0.0
     bayer: BayerPattern
     bit_depth: int
+    mirrored: Mirrored | None = None
 
 
 class ProjectorConditions(Record):
@@ -88,6 +94,7 @@ _WORDS = {
     "gain_db": "gain (dB)",
     "bayer": "mosaic",
     "bit_depth": "bit depth",
+    "mirrored": "mirroring",
     "mode": "mode",
     "frame_period_ms": "frame period (ms)",
 }
@@ -106,6 +113,8 @@ def _differences(device: str, known: Record, now: Record) -> Iterator[str]:
         old, new = getattr(known, name), getattr(now, name)
         if name == "frame_period_ms" and abs(new - old) <= _SAME_PERIOD * old:
             continue
+        if name == "mirrored" and None in (old, new):
+            continue  # a driver of before did not say
         if old != new:
             yield f"the {device}'s {_WORDS[name]} was {_text(old)} and is {_text(new)}"
 

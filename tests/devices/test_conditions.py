@@ -7,6 +7,7 @@ import pytest
 from dsl_core.devices.conditions import check_conditions, current_conditions, with_calibration
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError
+from dsl_core.model.conditions import CaptureConditions, differences
 from tests.cases.small_rig import small_rig
 
 TWIN = {"size": "48x36", "scene": "plane"}
@@ -33,3 +34,18 @@ def test_a_calibration_for_other_settings_needs_an_override() -> None:
         calibrated, overridden = with_calibration(devices, known, override=True)
     assert calibrated.calibration == small_rig()
     assert overridden == check_conditions(known, devices)
+
+
+def test_a_picture_that_is_mirrored_otherwise_needs_an_override_where_both_say_so() -> None:
+    with open_rig("twin", TWIN) as devices:
+        now = current_conditions(devices)
+
+    def turned(mirrored: str | None) -> CaptureConditions:
+        return now.model_copy(update={"camera": now.camera.model_copy(update={"mirrored": mirrored})})
+
+    said = ("the camera's mirroring was off and is top to bottom",)
+    assert differences(turned("off"), turned("top to bottom")) == said
+    assert differences(turned("off"), turned("off")) == ()
+    # Calibrations and drivers of before do not say.
+    assert differences(turned(None), turned("top to bottom")) == ()
+    assert differences(turned("off"), turned(None)) == ()

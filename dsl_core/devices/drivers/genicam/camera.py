@@ -116,6 +116,7 @@ class GenicamCamera(Camera):
         return prepared, CameraInfo(
             port.model, port.serial, width, height, prepared.format.mosaic, prepared.bit_depth,
             prepared.exposure_range_ms, prepared.region_px, prepared.binning, prepared.gain_db,
+            prepared.mirrored,
         )  # fmt: skip
 
     def _ready_port(self) -> GenicamPort:

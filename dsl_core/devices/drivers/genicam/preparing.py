@@ -16,6 +16,7 @@ from dsl_core.devices.drivers.genicam.pixel_formats import PixelFormat, best_for
 from dsl_core.devices.drivers.genicam.port import GenicamPort
 from dsl_core.devices.drivers.genicam.settings import GenicamSettings
 from dsl_core.errors import DeviceError
+from dsl_core.model.conditions import Mirrored
 
 #: Standard name first, then that of older cameras; both in microseconds.
 EXPOSURE = ("ExposureTime", "ExposureTimeAbs")
@@ -49,6 +50,7 @@ class Prepared:
     gain_db: float
     exposure_range_ms: tuple[float, float]
     exposure_feature: str
+    mirrored: Mirrored
 
 
 def prepare(
@@ -78,6 +80,7 @@ def prepare(
         gain_db=_set_gain(port, settings.gain_db),
         exposure_range_ms=(low_us / 1000.0, high_us / 1000.0),
         exposure_feature=exposure_feature,
+        mirrored=_mirrored(port),
     )
 
 
@@ -209,6 +212,17 @@ def _set_gain(port: GenicamPort, gain_db: float) -> float:
         )
     port.write("Gain", gain_db)
     return float(port.read("Gain"))
+
+
+def _mirrored(port: GenicamPort) -> Mirrored:
+    """How the camera turns its picture: what a calibration calls left is right then, or above below.
+
+    Somebody may need that, as of a camera that hangs upside down, so that it is noted rather than set.
+    """
+    across, down = (port.has(name) and bool(port.read(name)) for name in ("ReverseX", "ReverseY"))
+    if across:
+        return "both ways" if down else "left to right"
+    return "top to bottom" if down else "off"
 
 
 def _trigger_by_software(port: GenicamPort) -> None:

@@ -39,6 +39,23 @@ def test_region_and_binning_are_of_the_sensor() -> None:
 
 
 @pytest.mark.parametrize(
+    ("features", "mirrored"),
+    [
+        ({}, "off"),
+        ({"ReverseX": 0.0, "ReverseY": 0.0}, "off"),
+        ({"ReverseX": 1.0}, "left to right"),
+        ({"ReverseX": 0.0, "ReverseY": 1.0}, "top to bottom"),
+        ({"ReverseX": 1.0, "ReverseY": 1.0}, "both ways"),
+    ],
+)
+def test_how_a_camera_turns_its_picture_is_noted_and_left(features: dict[str, float], mirrored: str) -> None:
+    sensor = FakeSensor()
+    sensor.features.update(features)
+    assert prepare(FakePort(sensor), GenicamSettings(), no_wait).mirrored == mirrored
+    assert features.items() <= sensor.features.items()
+
+
+@pytest.mark.parametrize(
     ("settings", "reason"),
     [
         ({"region_px": (0, 0, 65, 48)}, "Width from 16 to 64"),
