@@ -66,6 +66,9 @@ class LiveController:
         self.set_exposure(self.state.exposure_ms.value)
         # A twin of full size that nobody uses any more would keep 180 MB of its scene.
         self._looked_at = None
+        # What another camera saw would pass for a picture of this one.
+        self._forget_latest()
+        self.state.frame.set(None)
 
     # Live view -------------------------------------------------------------------------------------
 
@@ -114,6 +117,12 @@ class LiveController:
                 # What a search that was cut off leaves suits nothing: the next look searches again.
                 self._looked_at = None
             self._exposer.end()
+            # The next live view begins with its own: this one may be of another rig, or of another picture.
+            self._forget_latest()
+
+    def _forget_latest(self) -> None:
+        with self._lock:
+            self._latest = None
 
     def fetch_frame(self) -> None:
         """Publish the newest frame to the page; called by the window's clock."""
@@ -127,6 +136,9 @@ class LiveController:
 
     def _look(self, devices: DeviceRig, progress: Progress) -> None:
         lost, self._counts = 0, FrameCounts()
+        if devices.put_back is not None:
+            # The page names the scene, and the target of the last calibration may still stand before it.
+            devices.put_back()
         while True:
             self._show_wanted(devices)
             progress.report("", self._counts.shown, 0)

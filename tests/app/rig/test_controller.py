@@ -158,7 +158,7 @@ def test_only_frames_lost_in_a_row_lose_the_camera(monkeypatch: pytest.MonkeyPat
             return answer
 
     with pytest.raises(DeviceError, match="No frame arrived"):
-        live._look(SimpleNamespace(camera=Camera()), NoProgress())  # type: ignore[arg-type]
+        live._look(SimpleNamespace(camera=Camera(), put_back=None), NoProgress())  # type: ignore[arg-type]
     assert answers == [good]
     assert live._counts == FrameCounts(shown=1, lost=7, skipped=1)
 
