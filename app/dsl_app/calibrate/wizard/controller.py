@@ -224,7 +224,15 @@ class WizardController:
 
     def _begin_capture(self, hands_free: bool) -> None:
         self._is_hands_free = hands_free
-        self._jobs.after_look(self._capture)
+        wanted = self.state.status
+
+        def capture() -> None:
+            # A person may have moved on during the look: the target stands where the other step wants it.
+            status = self.state.status
+            if wanted is not None and status is not None and status.step.key == wanted.step.key:
+                self._capture()
+
+        self._jobs.after_look(capture)
 
     def capture_all(self) -> None:
         """Capture every step that lacks captures and fit, where the rig places targets itself."""
