@@ -244,6 +244,15 @@ class MaterialsPanel(QWidget):
         if materials is not None and materials.found.scores.measure is measure:
             limits = materials.found.limits
         self._offer(measure, limits)
+        self._tell(materials)
+
+    def _tell(self, materials: Materials | None) -> None:
+        """Say what the map rests on, or that its measure is not the chosen one, whose limits are shown."""
+        if materials is None:
+            self.text.setText(HINT)
+        else:
+            tell = materials_text if self._is_of_chosen_measure else other_measure_text
+            self.text.setText(tell(materials))
 
     def _offer(self, measure: Measure, limits: Limits) -> None:
         """Offer what belongs to a measure."""
@@ -268,11 +277,12 @@ class MaterialsPanel(QWidget):
         for button in (self.clear, self.write):
             allow(button, materials is not None, "Name the materials first.")
         self.table.setVisible(materials is not None)
-        self.text.setText(HINT if materials is None else materials_text(materials))
         self.text.setToolTip(plain_tip("" if materials is None else _method(materials)))
+        if materials is not None:
+            self._follow_scores(materials.found.scores, materials.found.limits)
+        self._tell(materials)
         if materials is None:
             return
-        self._follow_scores(materials.found.scores, materials.found.limits)
         rows, colours = [], materials.found.shown.palette(self._theme.ground)
         for row in materials.found.rows:
             if not row.pixels and len(materials.found.rows) > 20:
@@ -318,6 +328,14 @@ def materials_text(materials: Materials) -> str:
         others = f" and {counted(len(materials.notes) - 1, 'more note')}" if len(materials.notes) > 1 else ""
         text += f" {first.rstrip('.')}{others}" + ("; point here for why." if colon or others else ".")
     return text
+
+
+def other_measure_text(materials: Materials) -> str:
+    """What a map is by, where the panel shows the measure and limits of the next one."""
+    found = materials.found
+    measure = next(text for text, measure in _MEASURES if measure is found.scores.measure).lower()
+    limit = f"{found.limits.worst:g}{_WORST[found.scores.measure][0][3]}"
+    return f"This map is by {measure}, limit {limit}. The measure above is that of the next map."
 
 
 def _undecided(materials: Materials) -> float:

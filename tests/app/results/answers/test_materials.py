@@ -230,7 +230,10 @@ def test_limits_of_another_measure_are_for_the_next_map(qtbot: QtBot, bench: Ben
     assert _shown(bench) is by_probability
     assert panel.way.measure is Measure.ANGLE
     assert panel.worst.value() == 0.3
+    told = "This map is by probability, limit 0.01. The measure above is that of the next map."
+    assert panel.text.text() == told, "the map would pass for one by the angle and its limit"
     _choose_measure(panel, Measure.PROBABILITY)
+    assert panel.text.text() == materials_text(by_probability)
     assert panel.worst.value() == by_probability.found.limits.worst
     _choose_measure(panel, Measure.ANGLE)
     _type(panel.worst, "0.3")
