@@ -41,7 +41,8 @@ def find_facts(
 
     latency_ms = 0.0 if devices is None else devices.projector.info.latency_ms
     needs = estimate(plan, target, latency_ms)
-    differ = devices is not None and calibration is not None and bool(check_conditions(calibration, devices))
+    differ = () if devices is None or calibration is None else check_conditions(calibration, devices)
+    overridden = (f"Used despite different settings: {'; '.join(differ)}.",) if differ and override else ()
     is_calibrated = devices is None or calibration is not None
     has_result = reconstructs and is_calibrated
     obstacles = [*_obstacles(devices, plan, calibration, override), *_place(target, has_result)]
@@ -53,8 +54,8 @@ def find_facts(
         needs.needed_bytes,
         needs.free_bytes,
         tuple(obstacles),
-        (*(() if is_calibrated else (NO_CALIBRATION,)), *find_remarks(calibration)),
-        differ,
+        (*(() if is_calibrated else (NO_CALIBRATION,)), *overridden, *find_remarks(calibration)),
+        bool(differ),
         is_calibrated=is_calibrated,
     )
 

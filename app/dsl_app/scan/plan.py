@@ -20,6 +20,7 @@ from dsl_app.shared.known_files import Kind, kind_of
 from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import DslError, PlanError
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry
 from dsl_core.io.plan_file import save_plan
@@ -55,6 +56,8 @@ class ScanPlanController:
         self._turn = 0
         #: What was chosen during a scan, which keeps its own calibration.
         self._next: CalibrationChoice | None = None
+        #: What a person has overridden: a calibration by its key, and how the settings differ from it.
+        self._overridden: tuple[str, frozenset[str]] = "", frozenset()
         self._stops = [
             rig.usable.follow(lambda _: self.take_rig()),
             state.phase.changed.connect(self._phase_changed),
@@ -140,6 +143,7 @@ class ScanPlanController:
         """Work out again what the plan costs and what prevents it from starting."""
         state = self.state
         session = state.interrupted.value
+        self._withdraw_override()
         facts = find_facts(
             self._devices, state.plan.value, state.target.value, self.calibration, state.override.value,
             state.then_reconstruct.value,
@@ -276,9 +280,25 @@ class ScanPlanController:
             self.choose_calibration(choice)
 
     def set_override(self, on: bool) -> None:
-        """Use the calibration although settings differ from it."""
+        """Use the calibration although settings differ from it; another one, or others, are not meant."""
+        self._overridden = self._differing
         self.state.override.set(on)
         self.refresh()
+
+    @property
+    def _differing(self) -> tuple[str, frozenset[str]]:
+        """The calibration in use by its key, and how the settings of the devices differ from it."""
+        known, devices = self.calibration, self._devices
+        clauses = () if known is None or devices is None else check_conditions(known, devices)
+        return self.state.calibration.value.key, frozenset(clauses)
+
+    def _withdraw_override(self) -> None:
+        """Override nothing that a person has not seen: another rig, other settings or calibration."""
+        if not self.state.override.value or self.state.phase.value.is_busy:
+            return
+        (key, differ), (seen_key, seen) = self._differing, self._overridden
+        if differ and (key != seen_key or not differ <= seen):
+            self.state.override.set(False)
 
     def close(self) -> None:
         """Disconnect from the rig's state."""
