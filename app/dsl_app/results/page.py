@@ -258,13 +258,14 @@ class ResultsPage(PageWidget):
         """Ask for a file and write a report about what is marked."""
         # Another result may be opened while a person chooses.
         result, materials = self._control.shown_result(), self._state.materials.value
+        marks = self._control.marks.listed
         if result is None:
             return
         draft = str(folder_for(result.path) / f"{result.path.stem}_report.html")
         kinds = "HTML page (*.html);;PDF (*.pdf)"
         target = ask_target(self, "Write a report", draft, kinds)
         if target is not None:
-            self._control.answers.write_report(result, materials, *target)
+            self._control.answers.write_report(result, materials, *target, marks)
 
     def subject(self) -> Path | None:
         """The offered scan, or the open result."""

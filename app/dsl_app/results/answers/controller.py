@@ -12,6 +12,7 @@ from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.replaced import load_as_read
 from dsl_core.analysis.classes import SpectralClass
 from dsl_core.analysis.classify import Brightness, Limits, Measure
+from dsl_core.io.result.annotations_file import Annotations
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.progress import Progress
 
@@ -156,9 +157,14 @@ class AnswersController:
         self._runner.submit(Job(f"Write {path.name}", work, done))
 
     def write_report(
-        self, result: ResultArrays, materials: Materials | None, path: Path, overwrite: bool = False
+        self,
+        result: ResultArrays,
+        materials: Materials | None,
+        path: Path,
+        overwrite: bool = False,
+        marks: Annotations | None = None,
     ) -> None:
-        """Write a report about a result, its saved marks and its materials: HTML page or PDF."""
+        """Write a report about a result, its marks (those saved for None) and its materials: page or PDF."""
 
         def work(progress: Progress) -> Path:
             from dsl_core.analysis.session_report import session_content, write_report
@@ -168,7 +174,7 @@ class AnswersController:
             content = session_content(
                 result.path.stem,
                 load_as_read(result),
-                load_annotations(result.path),
+                load_annotations(result.path) if marks is None else marks,
                 None if materials is None else materials.found,
                 () if materials is None else materials.of_classes,
             )

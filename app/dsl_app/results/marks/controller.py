@@ -19,6 +19,7 @@ from dsl_app.shared.notify import Notifier
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.evaluation.marks import runs_of
+from dsl_core.io.result.annotations_file import Annotations
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.spectra.reference_file import Reference, ReferenceFile, read_references
 from dsl_core.progress import Progress
@@ -248,6 +249,11 @@ class MarksController:
         """Read the marks of the result that was just opened; forgets the changes to those of another."""
         self._undo.forget(self.state)
         self._storage.read()
+
+    @property
+    def listed(self) -> Annotations | None:
+        """The marks that are listed, saved or not; None where those of the result have not been read."""
+        return self._storage.listed
 
     @property
     def is_reading(self) -> bool:

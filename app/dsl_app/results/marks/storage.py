@@ -63,6 +63,14 @@ class MarkStorage:
         self._read()
 
     @property
+    def listed(self) -> Annotations | None:
+        """The marks that are listed, saved or not; None where those of the result have not been read.
+
+        On a full disk, or in a folder that is read only, they are not what the file holds.
+        """
+        return annotations_of(self.state.marks.value) if self._reading is _Reading.DONE else None
+
+    @property
     def is_reading(self) -> bool:
         """Whether saved marks are still being read."""
         return self._reading is _Reading.RUNNING
