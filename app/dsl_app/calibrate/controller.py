@@ -51,6 +51,8 @@ class CalibrateController:
         self.library = LibraryController(state, rig, runner, notifier, self._store)
         self.wizard_ready: Event[tuple[WizardState, WizardController]] = Event()
         self._wizard: WizardController | None = None
+        #: Counts readings of the campaign: what the last one read is shown, whichever ends last.
+        self._reads = 0
         #: Holds the lock of the campaign that is written; a second release does nothing.
         self._lock = ExitStack()
         self._stops = [
@@ -107,17 +109,19 @@ class CalibrateController:
         if facts is None:
             return
         conditions = current_conditions(devices) if devices is not None and self._fits(facts) else None
+        self._reads += 1
+        read = self._reads
 
         def work(progress: Progress) -> tuple[Row, ...]:
             progress.report("read the campaign", 0, 0)
             return self._kinds.rows(facts.path, conditions)
 
         def done(rows: tuple[Row, ...]) -> None:
-            if self.state.campaign.value == facts:
+            if read == self._reads:
                 self.state.rows.set(rows)
 
         def failed(error: Exception) -> None:
-            if self.state.campaign.value == facts:
+            if read == self._reads:
                 self.state.trouble.set(sentence_of(error))
 
         self._runner.submit(Job("Read the campaign", work, done, failed, is_minor=True))

@@ -38,20 +38,32 @@ class LibraryController:
     ) -> None:
         self._state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
         self._library = library
+        #: Count requests: of several that run, the last one wins, whichever ends last.
+        self._reads = self._uses = 0
 
     def load(self) -> None:
         """List every version of every calibration."""
+        self._reads += 1
+        read = self._reads
 
         def work(progress: Progress) -> tuple[LibraryLine, ...]:
             progress.report("read the library", 0, 0)
             return self._library.lines()
 
-        self._runner.submit(Job("Read the library", work, self._state.library.set, is_minor=True))
+        def done(lines: tuple[LibraryLine, ...]) -> None:
+            if read == self._reads:
+                self._state.library.set(lines)
+
+        self._runner.submit(Job("Read the library", work, done, is_minor=True))
 
     def use(self, key: str) -> None:
         """Scan with a calibration from now on, if the library still has it."""
+        self._uses += 1
+        use = self._uses
 
         def done(_: LibraryEntry) -> None:
+            if use != self._uses:
+                return
             self._state.in_use.set(key)
             self._state.note.set(f"Scans use the calibration {key} from now on. Plan one on the Scan page.")
 
