@@ -321,10 +321,10 @@ class WizardController:
     def _accepted(self, fit: Fit) -> None:
         state, work = self.state, self._the_work
         state.fit.set(fit)
-        state.note.set(f"{state.title} is accepted.")
+        state.note.set(f"{state.title}: accepted.")
 
         def written(made: Products) -> None:
-            state.note.set(f"{state.title} is accepted. {products_text(made)}")
+            state.note.set(f"{state.title}: accepted. {products_text(made)}")
 
         self._jobs.start(
             Doing.KEEPING, "Write the rig", lambda progress: work.write(*self._library()), written

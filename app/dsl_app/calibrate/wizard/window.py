@@ -238,10 +238,8 @@ class WizardButtons(QWidget):
         self._text = label("", "muted", name="Current activity")
         self._bar = progress_bar("Progress")
         self._bar.setFixedWidth(BAR_PX)
-        # The page above must not jump when work begins.
-        policy = self._bar.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)
-        self._bar.setSizePolicy(policy)
+        # The page above must not jump when work begins; a sentence has the whole width when it has ended.
+        self._text.setMinimumHeight(self._bar.sizeHint().height())
         self._lay_out()
         self._connect()
 

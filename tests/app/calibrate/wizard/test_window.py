@@ -7,9 +7,7 @@ from dsl_app.calibrate.state import RowState
 from dsl_app.calibrate.wizard.state import Doing
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import (
-    QWidget,
-)
+from PySide6.QtWidgets import QLabel, QWidget
 
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
@@ -37,7 +35,15 @@ def test_a_calibration_by_mouse_from_placing_to_accepting(stage: Stage) -> None:
     assert cell(wizard.fit.figures, 0, 1) == "Brightest"
     assert "within their limits" in wizard.fit.verdict.text()
     click(buttons.accept)
-    stage.wait(lambda: "The rig is saved in" in state.note.value)
+    stage.wait(lambda: "The rig is saved in" in state.note.value and state.doing.value is Doing.IDLE)
+    said, height_px = buttons.findChild(QLabel), buttons.height()
+    assert isinstance(said, QLabel)
+    assert said.text().startswith("Self-test: accepted.")
+    assert said.width() == buttons.width(), "the end of the sentence is cut off beside nothing"
+    buttons._bar.show()
+    buttons.layout().activate()
+    assert buttons.sizeHint().height() <= height_px, "the page above jumps"
+    buttons._bar.hide()
     assert buttons.leave.text() == "&Close"
     assert buttons.following.text() == "&Next: Geometry…"
     assert buttons.following.property("role") == "primary"
