@@ -298,6 +298,10 @@ class ResultsPage(PageWidget):
         name = f"{result.path.stem}_spectra"
         return PlotFigure(name, spectra.plot, spectra.apply_theme, spectra.named_curves)
 
+    def unsaved(self) -> str:
+        """The marks that cannot be saved, as on a full disk."""
+        return self._control.marks.save_again()
+
     def release(self) -> None:
         """Release the graphics and stop following the recent files."""
         super().release()

@@ -213,8 +213,8 @@ class PagedWindow(QMainWindow):
             _log.warning("%s", trouble)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Ask before jobs are stopped; end all threads and save the layout."""
-        if not self._may_stop():
+        """Ask before jobs are stopped or work is lost; end all threads and save the layout."""
+        if not self._may_stop() or not self._may_lose():
             event.ignore()
             return
         for page in self._made.values():
@@ -240,6 +240,14 @@ class PagedWindow(QMainWindow):
             " scans and reconstructions can be resumed.",
             go="Stop and quit",
             stay="Keep working",
+        )
+
+    def _may_lose(self) -> bool:
+        lost = " ".join(filter(None, (page.unsaved() for page in self._made.values())))
+        if not lost:
+            return True
+        return confirm(
+            self, "Not saved", f"{lost} Quit without them?", go="Quit all the same", stay="Keep working"
         )
 
 

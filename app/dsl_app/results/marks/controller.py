@@ -255,6 +255,10 @@ class MarksController:
         """The marks that are listed, saved or not; None where those of the result have not been read."""
         return self._storage.listed
 
+    def save_again(self) -> str:
+        """Save what could not be saved before; says what still cannot be, and why, empty when all is."""
+        return self._storage.save_again()
+
     @property
     def is_reading(self) -> bool:
         """Whether saved marks are still being read."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from pathlib import Path
@@ -39,10 +39,19 @@ class _Reading(Enum):
     FAILED = "failed"
 
 
+@dataclass(frozen=True)
+class _Unsaved:
+    """Marks that could not be saved; ``stamp`` is of the file that they were to replace."""
+
+    marks: Annotations
+    stamp: tuple[int, int] | None
+
+
 class MarkStorage:
     """Reads the marks of the open result and saves them at every change.
 
     Saving replaces the whole file. So existing marks are read first, or set aside if the user chooses to.
+    Marks that cannot be saved, as on a full disk, are kept for as long as the window is open.
     """
 
     def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier) -> None:
@@ -52,6 +61,8 @@ class MarkStorage:
         self._waiting: list[Callable[[], None]] = []
         #: When the file was changed last, and its size, as far as this window knows.
         self._stamp: tuple[int, int] | None = None
+        #: What could not be saved, by the path of its result.
+        self._unsaved: dict[Path, _Unsaved] = {}
 
     # Read ------------------------------------------------------------------------------------------
 
@@ -91,9 +102,10 @@ class MarkStorage:
         if result is None:
             self._finish()
             return
+        kept = self._unsaved.get(result.path)
         try:
-            saved = load_annotations(result.path)
-            self._stamp = stamp_of(annotations_path(result.path))
+            saved = load_annotations(result.path) if kept is None else kept.marks
+            self._stamp = stamp_of(annotations_path(result.path)) if kept is None else kept.stamp
         except DslError as error:
             self._fail(str(error))
             return
@@ -190,18 +202,43 @@ class MarkStorage:
                 " again, then mark it.",
             )
             return
-        path = annotations_path(result.path)
-        if stamp_of(path) not in (None, self._stamp):
+        marks = annotations_of(self.state.marks.value)
+        try:
+            self._stamp = self._write(result.path, marks, self._stamp)
+        except DslError as error:
+            self._unsaved[result.path] = _Unsaved(marks, self._stamp)
+            self._notifier.tell("warning", f"The marks could not be saved: {error}")
+
+    def save_again(self) -> str:
+        """Save what could not be saved before; says what still cannot be, and why, empty when all is."""
+        lost = []
+        for path, kept in tuple(self._unsaved.items()):
+            try:
+                stamp = self._write(path, kept.marks, kept.stamp)
+            except DslError as error:
+                lost.append(f"The marks of {path.stem} are not saved: {error}")
+                continue
+            if self.state.result.value is not None and self.state.result.value.path == path:
+                self._stamp = stamp
+        return " ".join(lost)
+
+    def _write(
+        self, result: Path, marks: Annotations, known: tuple[int, int] | None
+    ) -> tuple[int, int] | None:
+        """Save marks next to a result where the file is the one that is ``known``, or else beside that.
+
+        Returns what the file is now; raises `StoreError`.
+        """
+        path = annotations_path(result)
+        if stamp_of(path) not in (None, known):
             self._notifier.tell(
                 "warning",
                 f"Another window has changed the marks in {path}.{set_aside(path)} Those of this window are"
                 " saved now. Close one of the windows.",
             )
-        try:
-            save_annotations(annotations_of(self.state.marks.value), result.path)
-            self._stamp = stamp_of(path)
-        except DslError as error:
-            self._notifier.tell("warning", f"The marks could not be saved: {error}")
+        save_annotations(marks, result)
+        self._unsaved.pop(result, None)
+        return stamp_of(path)
 
 
 # Records on disk -----------------------------------------------------------------------------------

@@ -65,6 +65,10 @@ class PageWidget(QWidget):
         """Whether what was opened last is still being read; further files wait for that."""
         return False
 
+    def unsaved(self) -> str:
+        """What would be lost if the window closed now and cannot be saved, and why; empty for nothing."""
+        return ""
+
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         apply_theme_inside(self, theme)

@@ -1,4 +1,4 @@
-"""Marks that could not be saved, as on a full disk, are part of what is written all the same."""
+"""Marks that could not be saved, as on a full disk, are written all the same, kept, and saved later."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.result.annotations_file import Annotations
+from dsl_core.io.result.annotations_file import Annotations, load_annotations
 from tests.app.support.results_bench import Bench
 from tests.app.support.results_bench import bench as bench
+from tests.app.support.small_result import write_small_result
 
 
 @pytest.fixture
@@ -39,3 +40,42 @@ def test_a_report_has_the_marks_that_are_listed(
     assert "The marks could not be saved" in full.window.toasts.shown[-1].text
     full.page.report()
     assert [pin.pixel for pin in reported[0].pins] == [(3, 5)]
+
+
+def test_marks_that_cannot_be_saved_are_not_lost_with_the_window(
+    full: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def stay(parent: object, title: str, text: str, **_: str) -> bool:
+        asked.append(text)
+        return False
+
+    monkeypatch.setattr("dsl_app.shell.paged_window.confirm", stay)
+    full.control.marks.pin((3, 5))
+    assert not full.window.close()
+    assert asked == [
+        "The marks of small are not saved: The disk is full: marks could not be written. Quit without them?"
+    ]
+    monkeypatch.undo()
+    result = full.state.result.value
+    assert result is not None
+    assert full.window.close(), "there is room again"
+    assert [pin.pixel for pin in load_annotations(result.path).pins] == [(3, 5)]
+
+
+def test_marks_that_cannot_be_saved_are_there_when_their_result_is_opened_again(
+    full: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    full.control.marks.pin((3, 5))
+    result = full.state.result.value
+    assert result is not None
+    (tmp_path / "other").mkdir()
+    full.control.open(write_small_result(tmp_path / "other"))
+    assert full.state.marks.value == ()
+    full.control.open(result.path)
+    assert [mark.pixel for mark in full.state.marks.value] == [(3, 5)]
+    monkeypatch.undo()
+    full.control.marks.pin((8, 8))
+    assert [pin.pixel for pin in load_annotations(result.path).pins] == [(3, 5), (8, 8)]
+    assert full.control.marks.save_again() == ""
