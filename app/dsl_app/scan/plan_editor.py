@@ -93,12 +93,18 @@ class PlanEditor(QGroupBox):
     def _choose(self, key: str) -> None:
         if key:
             self.preset_chosen.emit(key)
+        else:
+            # A plan becomes a custom one by being changed, and is none by its name alone.
+            self._show_preset()
+
+    def _show_preset(self) -> None:
+        self.preset.choose("" if self._preset is None else self._preset.key)
 
     def set_plan(self, plan: CapturePlan, period_ms: float, longest_ms: float = LONGEST_MS) -> None:
         """Show a plan on a projector with this frame period and a camera with this longest exposure."""
         self._plan = plan
-        preset = preset_of(plan, period_ms)
-        self.preset.choose("" if preset is None else preset.key)
+        self._preset = preset = preset_of(plan, period_ms)
+        self._show_preset()
         self._purpose.setText(_purpose_of(plan) if preset is None else preset.purpose)
         self.code.choose(name_of(plan.code) or "")
         lines = isinstance(plan.spectral, ScanLines | LineComb)

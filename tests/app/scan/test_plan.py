@@ -234,6 +234,16 @@ def test_buttons_ask_for_files(qtbot: QtBot) -> None:
             QTest.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
+def test_a_plan_is_not_a_custom_one_by_its_name_alone(qtbot: QtBot) -> None:
+    editor = PlanEditor()
+    qtbot.addWidget(editor)
+    editor.set_plan(CapturePlan(), 1000 / 60)
+    for key in ("reference", ""):
+        editor.preset.choose(key)
+        editor.preset.activated.emit(editor.preset.currentIndex())
+        assert editor.preset.currentData() == "reference"
+
+
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.key)
 def test_a_preset_is_known_on_a_projector_of_more_columns(preset: Preset) -> None:
     wide = on_columns(preset.plan, 1280).model_copy(update={"projector_size_px": (1280, 720)})
