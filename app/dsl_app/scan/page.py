@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGroupBox, QVBoxLayout, QWidget
 
@@ -230,6 +230,13 @@ class ScanPage(PageWidget):
         if not self._state.phase.value.is_busy:
             self._controller.plans.refresh()
             self._controller.plans.load_library()
+
+    def event(self, event: QEvent) -> bool:
+        """Refresh when a person comes back from another program, where room was made on the disk perhaps."""
+        is_back = event.type() is QEvent.Type.WindowActivate
+        if is_back and self.isVisible() and not self._state.phase.value.is_busy:
+            self._controller.plans.refresh()
+        return super().event(event)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """What happens from now on is not seen here."""

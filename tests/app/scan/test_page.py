@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,9 +23,9 @@ from dsl_app.scan.view import FramePicture
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.theme import DARK, LIGHT
 from dsl_app.shared.widgets.figure_file import save_figure
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QApplication, QFileDialog
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import DeviceError
@@ -249,6 +250,18 @@ def test_exposures_snap_to_whole_cycles(ready: Bench) -> None:
     assert bench.state.plan.value.code_settings == (0, 1, 2)
     page.plan.settings._remove(0)
     assert len(bench.state.plan.value.settings) == 2
+
+
+def test_room_that_is_made_on_the_disk_is_seen_on_coming_back(
+    ready: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, bench, _ = ready
+    with monkeypatch.context() as full:
+        full.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1_000))
+        bench.scans.plans.refresh()
+    assert not page.run.start.isEnabled()
+    QApplication.sendEvent(page, QEvent(QEvent.Type.WindowActivate))
+    assert page.run.start.isEnabled()
 
 
 def test_an_override_is_shown_as_it_is(ready: Bench) -> None:
