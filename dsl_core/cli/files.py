@@ -94,6 +94,7 @@ def import_(
         import_capture,
         import_stereo,
     )
+    from dsl_core.io.calibration_library import name_from
     from dsl_core.io.published.calibration import check_calibration, holds_calibration
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
@@ -139,7 +140,8 @@ def import_(
             imported, doubts = exchange.import_calibration(source, rig, camera, light, unit_mm or 1.0)
             for sentence in doubts:
                 output.say(f"Warning: {sentence}.")
-            save_rig(imported, target, overwrite=force)
+            name = name_from(target.stem) or imported.name
+            save_rig(imported.model_copy(update={"name": name}), target, overwrite=force)
     else:
         _import_dataset(output, source, target, rig)
     if target is not None:

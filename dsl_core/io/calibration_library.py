@@ -75,6 +75,15 @@ def check_name(name: str) -> None:
         )
 
 
+def name_from(text: str) -> str:
+    """The name that is closest to a text, such as that of a file; empty where nothing of it can be used.
+
+    >>> name_from("room 12 & 13")
+    'room 12 - 13'
+    """
+    return re.sub(r"[^\w .+-]", "-", text).lstrip(" .+-")
+
+
 def library_home(home: Path | None = None) -> Path:
     """The folder of the library: the one given, that of ``DSL_SCAN_HOME``, or the system's usual place."""
     return own_folder() / "calibrations" if home is None else home

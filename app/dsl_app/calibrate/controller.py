@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -25,7 +24,7 @@ from dsl_core.campaign.products import Products, write_products
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError, DecodeError, DslError
 from dsl_core.io import CAMPAIGN_NAME
-from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.calibration_library import CalibrationLibrary, name_from
 from dsl_core.io.campaign_folder import CampaignFolder, take_campaign
 from dsl_core.progress import Progress
 from dsl_core.words import quoted
@@ -331,5 +330,4 @@ def library_name(folder: Path) -> str:
     >>> library_name(Path("a/room 12 & 13"))
     'room 12 - 13'
     """
-    name = re.sub(r"[^\w .+-]", "-", folder.name).lstrip(" .+-")
-    return name or "campaign"
+    return name_from(folder.name) or "campaign"

@@ -23,7 +23,7 @@ from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.paths import barrier, expanded
 from dsl_core.errors import StoreError
-from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration
+from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration, name_from
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
@@ -166,7 +166,9 @@ def import_calibration(request: ImportRequest, library: CalibrationLibrary, prog
     rig, _ = exchange.import_calibration(
         request.folder, base_of(request, library), _size(request), unit_mm=request.unit_mm
     )
-    return save_rig(rig, request.target)
+    # The library takes it by this name: rigs of several folders are not versions of one calibration.
+    name = name_from(request.target.stem) or rig.name
+    return save_rig(rig.model_copy(update={"name": name}), request.target)
 
 
 def base_of(request: ImportRequest, library: CalibrationLibrary) -> Rig:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.known_files import first_free
 from dsl_app.shared.paths import place_trouble, there
+from dsl_core.io.calibration_library import name_from
 from dsl_core.words import quoted
 
 if TYPE_CHECKING:
@@ -182,6 +183,9 @@ def import_view(state: ImportState) -> ImportView:
     remark = "" if request is None else f"Creates {request.target.name}."
     if is_calibration:
         remark += " The calibration is also added to the library."
+        name = "" if request is None else name_from(request.target.stem)
+        if name in state.library.value:
+            remark += f" That has one named {name} already, of which this becomes the current version."
     return ImportView(
         "" if busy else state.trouble.value,
         f"{busy}…" if busy else remark,

@@ -14,6 +14,7 @@ from dsl_app.importing.state import FileRow, Found, ImportRequest, ImportState, 
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.known_files import Kind, kind_of
 
+from dsl_core.campaign.products import import_entry
 from dsl_core.cli import main
 from dsl_core.errors import Cancelled
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -117,6 +118,16 @@ def test_a_calibration_becomes_a_file(bench: Bench, made: Folders) -> None:
     assert not bench.control.start()
 
 
+def test_calibrations_of_several_folders_are_not_versions_of_one(bench: Bench, made: Folders) -> None:
+    library = CalibrationLibrary(bench.home / "library")
+    for name in ("left bench", "right & bench"):
+        bench.look(made.rig)
+        bench.control.change(target=bench.home / f"{name}.json")
+        assert bench.control.start()
+        import_entry(bench.done[-1], library)
+    assert library.names() == ("left bench", "right - bench")
+
+
 def test_a_calibration_is_doubted_and_read_in_a_unit_as_by_the_command(
     bench: Bench, made: Folders, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -132,6 +143,7 @@ def test_a_calibration_is_doubted_and_read_in_a_unit_as_by_the_command(
     words = shlex.split(bench.control.command_line())
     assert main([*words[1:-3], str(tmp_path / "by command.json"), *words[-2:]]) == 0, capsys.readouterr().err
     assert bench.control.start()
+    assert load_rig(tmp_path / "by command.json").name == "by command"
     for path in (*bench.done, tmp_path / "by command.json"):
         assert load_rig(path).pose.vector_mm == pytest.approx(own.pose.vector_mm)
     bench.control.change(unit_mm=0.1)

@@ -28,6 +28,9 @@ def test_a_calibration_also_asks_its_size_and_goes_to_the_library() -> None:
     view = import_view(state)
     assert view.asks_lengths
     assert view.remark == "Creates rig.json. The calibration is also added to the library."
+    state.library.set(("lab", "rig"))
+    told = " That has one named rig already, of which this becomes the current version."
+    assert import_view(state).remark == view.remark + told
 
 
 def test_while_a_folder_is_checked_old_trouble_is_not_shown() -> None:
