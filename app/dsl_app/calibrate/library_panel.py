@@ -224,7 +224,11 @@ class LibraryPanel(QGroupBox):
         name, chosen = QFileDialog.getSaveFileName(self, "Export a calibration", draft, kinds)
         if name:
             path, may_replace = with_ending(name, chosen or kinds, kinds)
-            self._commands.export(self.key, path, FORMS.get(chosen, "entry"), overwrite=may_replace)
+            form = FORMS.get(chosen, "entry")
+            if form == "published" and path.suffix.lower() == ".json":
+                # The name that the dialog proposes is that of a file; it asked about no folder.
+                path, may_replace = path.with_suffix(""), False
+            self._commands.export(self.key, path, form, overwrite=may_replace)
 
     def _import(self) -> None:
         path = ask_file(self, "Import a calibration", "Calibrations (*.json)")

@@ -52,6 +52,10 @@ def test_an_export_has_the_ending_by_which_it_is_imported(
         monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, chosen=chosen: chosen)
         panel._export()
         assert asked.pop() == ("room 12", tmp_path / name, form, {"overwrite": form == "published"})
+    proposed = (str(tmp_path / "room.v2.json"), folder)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: proposed)
+    panel._export()
+    assert asked.pop() == ("room 12", tmp_path / "room.v2", "published", {"overwrite": False})
 
 
 def test_the_version_that_is_selected_stays_so_when_others_come_and_go(
