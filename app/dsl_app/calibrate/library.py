@@ -40,6 +40,14 @@ class LibraryController:
         self._library = library
         #: Count requests: of several that run, the last one wins, whichever ends last.
         self._reads = self._uses = 0
+        #: What was said last of the calibration that scans use.
+        self._used_note = ""
+        state.in_use.changed.connect(lambda _: self._forget_used_note())
+
+    def _forget_used_note(self) -> None:
+        """Say no more which calibration scans use once another one was chosen, here or on the Scan page."""
+        if self._used_note and self._state.note.value == self._used_note:
+            self._state.note.set("")
 
     def load(self) -> None:
         """List every version of every calibration."""
@@ -65,7 +73,8 @@ class LibraryController:
             if use != self._uses:
                 return
             self._state.in_use.set(key)
-            self._state.note.set(f"Scans use the calibration {key} from now on. Plan one on the Scan page.")
+            self._used_note = f"Scans use the calibration {key} from now on. Plan one on the Scan page."
+            self._state.note.set(self._used_note)
 
         def failed(error: Exception) -> None:
             self._notifier.tell("error", sentence_of(error))

@@ -51,3 +51,12 @@ def test_rows_read_before_a_calibration_was_accepted_do_not_replace_it(
     assert now[0].is_accepted
     finish_older()
     assert states(bench) == now
+
+
+def test_what_was_said_of_the_calibration_in_use_ends_with_its_use(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path)
+    bench.library.store("lab", published_rig())
+    bench.control.library.use("lab")
+    assert "Scans use the calibration lab from now on" in bench.state.note.value
+    bench.state.in_use.set("")  # another one was chosen on the Scan page
+    assert bench.state.note.value == ""
