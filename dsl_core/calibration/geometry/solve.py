@@ -40,6 +40,7 @@ from dsl_core.calibration.geometry.pose_series import (
     largest_angle_deg,
 )
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
+from dsl_core.calibration.geometry.stretched import looks_turned, sentence_on, stretched
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import (
@@ -90,6 +91,13 @@ def calibrate_geometry(
     priors = [each for each in priors_of(start) if each.number not in held] if columns_only else []
     fit = adjust(poses, start, held, priors)
     kept = _fitting(poses, fit)
+    stretch = None if looks_turned(board) else stretched(poses, fit, held, priors)
+    if stretch is not None:
+        fits = _fitting(stretch.poses, stretch.fit)
+        if (fits | ~kept).all():
+            poses, fit, kept = stretch.poses, stretch.fit, fits
+        else:
+            stretch = None
     final = fit
     if not kept.all():
         rest = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
@@ -113,6 +121,7 @@ def calibrate_geometry(
     fitting = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
     knock = knocked(fitting, final.parameters)
     unseen += [] if knock is None else [knock.sentence]
+    unseen += [] if stretch is None else [sentence_on(stretch.share, board)]
     return found.model_copy(update={"warnings": (*unseen, *warnings, *doubts(found, tilt, baseline_mm))})
 
 
