@@ -135,6 +135,8 @@ def _steadiness(camera: CameraCheck) -> Iterator[Figure]:
             " of its black level.",
         )
     is_line = max(each.value for each in camera.linearity_percent) <= LINEARITY_PERCENT
+    # Black that is cut off is not where light without exposure would be.
+    is_line &= camera.black_level_dn.value >= BLACK_NOISES * camera.read_noise_dn.value
     if camera.exposure_offset_ms is not None and is_line:
         yield _figure(
             "exposure, longer than stated by",
@@ -202,9 +204,10 @@ def _projector(projector: ProjectorCheck) -> Iterator[Figure]:
         worst,
         "%",
         high=RAMP_PERCENT,
-        advice="The light changes with more than the drive level: switch off the projector's picture"
-        " enhancements and dynamic contrast, and in the computer's display settings colour profiles and night"
-        " light.",
+        advice="The light changes with more than the drive level, or dark or bright levels look alike: switch"
+        " off the projector's picture enhancements and dynamic contrast, and in the computer's display"
+        " settings colour profiles and night light; and set both to the same range of levels, full (0 to 255)"
+        " or limited.",
     )
     yield Figure(
         name="ramps, steps that fall",

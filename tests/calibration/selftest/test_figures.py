@@ -197,6 +197,13 @@ def test_a_linear_projector_passes_on_either_side_of_one() -> None:
     assert not named(with_("projector", gamma=of(0.7)))["gamma"].passed
 
 
+def test_black_that_is_cut_off_blames_no_exposure() -> None:
+    long = with_("camera", exposure_offset_ms=of(-0.12))
+    assert [each.name for each in failures(selftest_figures(long))] == ["exposure, longer than stated by"]
+    cut = with_("camera", exposure_offset_ms=of(-0.12), black_level_dn=of(0.0))
+    assert [each.name for each in failures(selftest_figures(cut))] == ["black level"]
+
+
 def test_the_difference_between_colours_is_a_share_of_gamma_with_its_deviation() -> None:
     uneven = ramps(gamma=Measured(value=2.222, std=0.02))
     found = named(with_("projector", ramps=uneven))["gamma, difference between colours"]
