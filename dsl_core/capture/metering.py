@@ -40,6 +40,8 @@ _BRIGHTER, _BRIGHTER_IN_DARK = 0.05, 0.005
 ENOUGH = 0.1
 #: A saturated picture says only that it is too bright: the next is exposed for this much less.
 _SHORTEN = 8.0
+#: An exposure that is shorter than a cycle by less than this share was meant to be one.
+ROUNDED = 0.05
 _MOST_FRAMES = 4
 #: Note of a scan: what white reached before it began, and what was done to exposures.
 WHITE_MEASURED = "exposures"
@@ -194,9 +196,12 @@ class _Fit:
 
     @property
     def in_cycles(self) -> bool:
-        """Whether exposures are whole cycles: a plan that exposes for less than one is for steady light."""
+        """Whether exposures are whole cycles: a plan that exposes for less than one is for steady light.
+
+        One that was typed, or rounded by a camera, or is for a projector of 60 Hz instead of 59.94, is whole.
+        """
         shortest_ms = min(setting.exposure_ms for setting in self.plan.settings)
-        return shortest_ms > (1 - 1e-6) * self.period_ms
+        return shortest_ms > (1 - ROUNDED) * self.period_ms
 
     def exposure_ms(self, wanted_ms: float, rounded: Callable[[float], int] = int) -> float:
         """The longest exposure of whole cycles within this one, or the shortest that there is.
@@ -221,6 +226,9 @@ class _Fit:
 
     def _shortened(self, white: _White) -> Metered:
         made = self._scaled(FILL / white.by_dimmest)
+        settings = zip(made.settings, self.plan.settings, strict=True)
+        shorter = tuple(min(pair, key=lambda each: each.exposure_ms) for pair in settings)
+        made = made.model_copy(update={"settings": shorter})
         shortest_ms = min(made.settings, key=self.light).exposure_ms
         least = white.by_dimmest * shortest_ms / self.darkest.exposure_ms
         said = f"White reaches {white.by_dimmest:.0%} of full scale even in its dimmest colour"

@@ -323,6 +323,14 @@ def test_exposures_below_a_cycle_are_shortened_within_the_range_of_the_camera(
     assert "exposures are shortened from 4 to 2.001 ms." in found.sentence
 
 
+@pytest.mark.parametrize("planned_ms", [9.99, 9.96, 9.6])
+def test_a_cycle_that_was_rounded_is_not_cut(planned_ms: float) -> None:
+    """Less than a cycle of a projector lacks colours; a plan of 16.67 ms met one of 59.94 Hz."""
+    found = meter(rig_of(Bench(light_for(3.0, planned_ms))), plan_of((planned_ms, 1.0)))
+    assert exposures(found) == [planned_ms]
+    assert f"It saturates even at {planned_ms:.4g} ms" in found.sentence
+
+
 def test_a_bracket_that_is_shortened_to_few_cycles_stays_one() -> None:
     found = meter(rig_of(Bench(light_for(4.0, 30.0))), plan_of((30.0, 1.0), (50.0, 1.0)))
     assert exposures(found) == [10.0, 20.0]
