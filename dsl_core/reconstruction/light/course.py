@@ -35,6 +35,8 @@ ALONE_STD = 0.005
 SETTING_STD, SLOPE_STD = 0.01, 0.02
 #: The same of settings that are not as calibrated; witnesses must be so much likelier then (chi-square).
 APART_STD, LIKELIER = 0.5, 25.0
+#: So many places of a step are fitted at once: what that takes stays in the cache of a core.
+AT_ONCE = 32
 #: Witnesses farther off than so many deviations weigh less.
 HUBER = 2.5
 #: Changes of light below these are left as they are.
@@ -149,21 +151,17 @@ def _stepped(heard: Heard, shots: int, flicker: float, first_lines: Sequence[int
     if places.size == 0:
         return None
 
-    def misfits_of(flicker: float) -> Floats:
-        each = (_misfit(heard, shots, flicker, nothing, SETTING_STD, int(at)) for at in places)
-        return np.array(list(each))
-
-    first = int(places[misfits_of(flicker).argmin()])
+    first = int(places[_misfits(heard, shots, flicker, nothing, SETTING_STD, places).argmin()])
     flicker = min(flicker, _course(heard, shots, nothing, step_at=first).flicker)
     smooth = min(
         _misfit(heard, shots, flicker, DRIFT_STD, SETTING_STD),
         _misfit(heard, shots, flicker, nothing, APART_STD),
     )
-    misfits = misfits_of(flicker)
+    misfits = _misfits(heard, shots, flicker, nothing, SETTING_STD, places)
     if float(misfits.min()) > smooth - LIKELIER:
         return None
-    by_lines = [_misfit(heard, shots, flicker, nothing, SETTING_STD, at) for at in first_lines]
-    if not heard.of_lamp.any() and min(by_lines, default=np.inf) < misfits.min() + LIKELIER:
+    by_lines = _misfits(heard, shots, flicker, nothing, SETTING_STD, np.array(first_lines, np.intp))
+    if not heard.of_lamp.any() and by_lines.min(initial=np.inf) < misfits.min() + LIKELIER:
         return None
     likely = np.flatnonzero(misfits < misfits.min() + LIKELIER)
     weight = np.exp(-0.5 * (misfits[likely] - misfits.min()))
@@ -209,19 +207,38 @@ def _reached(shots: int, before: int, at: int) -> Floats:
 
 
 def _misfit(
+    heard: Heard, shots: int, flicker: float, drift_std: tuple[float, float], setting_std: float
+) -> float:
+    """How badly the likeliest course fits all witnesses and what is believed before (robust chi-square)."""
+    believed = _believed(heard, drift_std, setting_std, with_step=False)
+    return float(_chi_square(heard.design(shots, None), heard.log, _noise(heard, flicker), believed))
+
+
+def _misfits(
     heard: Heard,
     shots: int,
     flicker: float,
     drift_std: tuple[float, float],
     setting_std: float,
-    step_at: int | None = None,
-) -> float:
-    """How badly the likeliest course fits all witnesses and what is believed before (robust chi-square)."""
-    values, _, left = _fit(heard, shots, flicker, drift_std, setting_std, step_at)
-    away = np.abs(left) / np.sqrt(_noise(heard, flicker))
-    believed = values / _believed(len(values), drift_std, setting_std, step_at is not None)
-    of_witnesses = np.where(away < HUBER, away**2, HUBER * (2 * away - HUBER)).sum()
-    return float(of_witnesses + believed @ believed)
+    places: NDArray[np.intp],
+) -> Floats:
+    """The same of courses with a step, at each of some shots; several at a time, as there are hundreds."""
+    smooth, noise = heard.design(shots, None), _noise(heard, flicker)
+    believed, found = _believed(heard, drift_std, setting_std, with_step=True), [np.empty(0)]
+    for start in range(0, len(places), AT_ONCE):
+        steps = heard.step(places[start : start + AT_ONCE, None])
+        of_each = np.broadcast_to(smooth, (len(steps), *smooth.shape))
+        designs = np.concatenate([of_each, steps[..., None]], -1)
+        found.append(_chi_square(designs, heard.log, noise, believed))
+    return np.concatenate(found)
+
+
+def _chi_square(designs: Floats, log: Floats, noise: Floats, believed: Floats) -> Floats:
+    """What fits (..., witnesses, terms) leave of witnesses, robust, and of what is ``believed`` before."""
+    values, _, left = _fitted(designs, log, noise, believed)
+    away = np.abs(left) / np.sqrt(noise)
+    of_witnesses = np.where(away < HUBER, away**2, HUBER * (2 * away - HUBER)).sum(-1)
+    return np.asarray(of_witnesses + ((values / believed) ** 2).sum(-1))
 
 
 def _course(
@@ -270,17 +287,22 @@ def _fit(
 
     The last of the terms is the step at ``step_at``, if there is one.
     """
-    design, log = heard.design(shots, step_at), heard.log
-    noise = _noise(heard, flicker)
-    prior = np.diag(_believed(design.shape[1], drift_std, setting_std, step_at is not None) ** -2)
+    believed = _believed(heard, drift_std, setting_std, step_at is not None)
+    return _fitted(heard.design(shots, step_at), heard.log, _noise(heard, flicker), believed)
+
+
+def _fitted(designs: Floats, log: Floats, noise: Floats, believed: Floats) -> tuple[Floats, Floats, Floats]:
+    """The terms of robust fits (..., witnesses, terms), their covariances, and what they leave."""
+    transposed = np.swapaxes(designs, -1, -2)
+    prior = np.diag(believed**-2)
     weight = 1 / noise
     for _ in range(4):
-        covariance = np.linalg.inv((design.T * weight) @ design + prior)
-        values = covariance @ (design.T @ (weight * log))
-        left = log - design @ values
+        covariance = np.linalg.inv((transposed * weight[..., None, :]) @ designs + prior)
+        values = covariance @ (transposed @ (weight * log)[..., None])
+        left = log - (designs @ values)[..., 0]
         away = np.abs(left) / np.sqrt(noise)
         weight = np.minimum(1, HUBER / np.maximum(away, 1e-9)) / noise
-    return np.asarray(values), np.asarray(covariance), np.asarray(left)
+    return np.asarray(values[..., 0]), np.asarray(covariance), np.asarray(left)
 
 
 def _noise(heard: Heard, flicker: float) -> Floats:
@@ -288,10 +310,9 @@ def _noise(heard: Heard, flicker: float) -> Floats:
     return heard.own_variance + heard.flickering * flicker**2
 
 
-def _believed(count: int, drift_std: tuple[float, float], setting_std: float, with_step: bool) -> Floats:
+def _believed(heard: Heard, drift_std: tuple[float, float], setting_std: float, with_step: bool) -> Floats:
     """Deviations of what is fitted before anything is seen."""
-    settings = [setting_std] * (count - 4 - with_step)
-    return np.array([*drift_std, 1.0, SLOPE_STD, *settings, *[STEP_STD] * with_step])
+    return np.array([*drift_std, 1.0, SLOPE_STD, *[setting_std] * heard.settings, *[STEP_STD] * with_step])
 
 
 def _flicker(heard: Heard, left: Floats) -> tuple[float, float]:

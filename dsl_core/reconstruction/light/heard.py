@@ -95,5 +95,9 @@ class Heard:
         terms = [time - other, time**2 - other**2, np.where(against_white, -1.0, 0.0), self.slope]
         terms += [(self.setting == each).astype(float) for each in range(self.settings)]
         if step_at is not None:
-            terms.append((self.shot >= step_at).astype(float) - (self.against >= step_at))
+            terms.append(self.step(step_at))
         return np.stack(terms, 1)
+
+    def step(self, at: int | NDArray[np.intp]) -> Floats:
+        """How each depends on a step at a shot (witnesses,); of shots (places, 1): (places, witnesses)."""
+        return np.asarray((self.shot >= at).astype(float) - (self.against >= at))

@@ -206,6 +206,24 @@ def test_a_witness_far_off_counts_by_its_distance_and_not_by_its_square() -> Non
     assert misfit == pytest.approx(1 + 4 + 2.5 * (2 * 10 - 2.5))
 
 
+def test_steps_fitted_together_are_those_fitted_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard = Heard.of(stepped(0.05, SHOTS // 2))
+    believed = course_module.DRIFT_STD, course_module.SETTING_STD
+    places = np.union1d(heard.shot, heard.against[heard.against >= 0])[1:]
+    monkeypatch.setattr(course_module, "AT_ONCE", 7)
+    together = course_module._misfits(heard, SHOTS, 0.004, *believed, places)
+    of_all = course_module._believed(heard, *believed, with_step=True)
+    alone = [
+        course_module._chi_square(
+            heard.design(SHOTS, int(at)), heard.log, course_module._noise(heard, 0.004), of_all
+        )
+        for at in places
+    ]
+    assert together.shape == places.shape
+    assert together == pytest.approx(np.array(alone), rel=1e-9)
+    assert course_module._misfits(heard, SHOTS, 0.004, *believed, places[:0]).shape == (0,)
+
+
 def stepped(height: float, at: int, seed: int = 1) -> list[Witness]:
     """Steady witnesses but for light that changes at once at a shot."""
     found = []
