@@ -6,10 +6,11 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from dsl_core.errors import StoreError, TakenError
 from dsl_core.io.atomic import make_folder, write_atomic
-from dsl_core.io.objects.store import ObjectFolder
+from dsl_core.io.objects.store import Found, ObjectFolder
 from dsl_core.io.reading import read_json
 from dsl_core.io.result.inventory import INVENTORY, METADATA_NAME
 from dsl_core.progress import NoProgress, Progress
@@ -57,9 +58,24 @@ def publish(
     What a run that was stopped has left there is replaced. Raises `StoreError`, and `TakenError` where there
     is a result already (unless ``overwrite``); what is no part of a result is never replaced.
     """
-    progress, there = progress or NoProgress(), objects.listed()
+    progress, there = progress or NoProgress(), require_free(objects, overwrite=overwrite)
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / METADATA_NAME)
     names = [path.relative_to(folder).as_posix() for path in files]
+    if METADATA_NAME in there:
+        objects.remove([METADATA_NAME])  # from now on, and until the end, what is there is no result
+    for i, (path, name) in enumerate(zip(files, names, strict=True)):
+        progress.report(f"write {folder.name}", i, len(files))
+        objects.put(name, path.read_bytes())
+    objects.remove(sorted(set(there) - {*names, METADATA_NAME}))
+    objects.put(METADATA_NAME, (folder / METADATA_NAME).read_bytes())
+
+
+def require_free(objects: ObjectFolder, *, overwrite: bool) -> dict[str, Found]:
+    """What is at an address, where a result may be written; asked before long work too.
+
+    Raises as `publish` does. What a run that was stopped has left is of a result, but lacks its metadata.
+    """
+    there = objects.listed()
     # Each array of a result is a folder with its metadata, and chunks in a folder "c".
     foreign = [
         name
@@ -69,14 +85,23 @@ def publish(
     if foreign:
         raise StoreError(f"{objects.address} contains {foreign[0]} and is not replaced. Choose another name.")
     if METADATA_NAME in there:
+        # Arrays of other programs are called the same.
+        if "schema_version" not in _attributes(objects.get(METADATA_NAME) or b""):
+            raise StoreError(
+                f"{objects.address} contains arrays that are no result of this program, and is not replaced."
+                " Choose another name."
+            )
         if not overwrite:
             raise taken(objects)
-        objects.remove([METADATA_NAME])  # from now on, and until the end, what is there is no result
-    for i, (path, name) in enumerate(zip(files, names, strict=True)):
-        progress.report(f"write {folder.name}", i, len(files))
-        objects.put(name, path.read_bytes())
-    objects.remove(sorted(set(there) - {*names, METADATA_NAME}))
-    objects.put(METADATA_NAME, (folder / METADATA_NAME).read_bytes())
+    return there
+
+
+def _attributes(metadata: bytes) -> dict[str, Any]:
+    """The attributes of a folder; none where its metadata cannot be read."""
+    try:
+        return dict(json.loads(metadata)["attributes"])
+    except (ValueError, KeyError, TypeError):
+        return {}
 
 
 def taken(objects: ObjectFolder) -> TakenError:

@@ -11,7 +11,7 @@ from pathlib import Path
 from dsl_core.extras import require_package
 from dsl_core.io.claims import Claim
 from dsl_core.io.objects.address import Address, address_of
-from dsl_core.io.objects.copies import fetch, publish, published_as, taken
+from dsl_core.io.objects.copies import fetch, publish, require_free
 from dsl_core.io.objects.store import ObjectFolder
 from dsl_core.progress import Progress
 from dsl_core.resources import own_folder
@@ -65,8 +65,7 @@ def published(path: Path, *, overwrite: bool = False, progress: Progress | None 
         return
     require_package("obstore")
     objects, room = ObjectFolder(address), room_of(address)
-    if not overwrite and published_as(objects, "schema_version") is not None:
-        raise taken(objects)
+    require_free(objects, overwrite=overwrite)
     with Claim(room):
         yield room
         publish(room, objects, overwrite=overwrite, progress=progress)

@@ -136,6 +136,32 @@ def test_a_name_that_is_taken_is_told_before_work_begins(twin: ObjectStoreTwin, 
         save_result(small_result(), draft)
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("notes.txt", b"mine", r"contains notes\.txt"),
+        ("zarr.json", b'{"zarr_format": 3, "attributes": {"title": "rain"}}', "arrays that are no result"),
+        ("zarr.json", b"{", "arrays that are no result"),
+    ],
+)
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_what_others_have_at_an_address_is_told_before_work_begins_and_stays(
+    twin: ObjectStoreTwin, result: Path, name: str, content: bytes, told: str, overwrite: bool
+) -> None:
+    twin.put(f"2026/a.zarr/{name}", content)
+    twin.put("2026/a.zarr/rain/c/0", b"years of it")
+    began = list[Path]()
+    with (
+        pytest.raises(StoreError, match=told),
+        published(Path("s3://bucket/2026/a.zarr"), overwrite=overwrite) as draft,
+    ):
+        began.append(draft)
+    assert not began
+    with pytest.raises(StoreError, match=told):
+        publish(result, ObjectFolder(RESULT), overwrite=overwrite)
+    assert twin.objects.keys() == {f"2026/a.zarr/{name}", "2026/a.zarr/rain/c/0"}
+
+
 def test_a_result_that_lacks_a_file_is_none(twin: ObjectStoreTwin, result: Path) -> None:
     publish(result, ObjectFolder(RESULT))
     del twin.objects["2026/a.zarr/rgb/zarr.json"]
