@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from dsl_core.analysis.alike import groups_alike, nearest_shapes
 from dsl_core.analysis.band_noise import band_correlation, usual_correlation
 from dsl_core.analysis.classes import FEWEST_BANDS, SpectralClass, is_judged, marked_by, shared_names
+from dsl_core.analysis.evened import evened
 from dsl_core.analysis.likelihood import Block, class_fit
 from dsl_core.analysis.mark_colours import Ground, mark_colour
 from dsl_core.errors import DecodeError
@@ -303,8 +304,11 @@ def _by_probability(
     from scipy.special import chdtrc
 
     chi_square, log_likelihood = np.empty((2, len(classes), at.size))
-    for index, each in enumerate(classes):
+    alike = evened(classes, np.median(block.std, axis=1), block.is_free)
+    for index, (each, wide) in enumerate(zip(classes, alike, strict=True)):
         chi_square[index], log_likelihood[index] = class_fit(block, each)
+        if wide is not each:
+            log_likelihood[index] = class_fit(block, wide)[1]
     order = np.argsort(-log_likelihood, axis=0)
     best = order[0]
     total = np.logaddexp.reduce(log_likelihood, axis=0)

@@ -275,6 +275,34 @@ def test_names_of_similar_materials_are_as_sure_as_they_are_right(
         assert (scores.margin >= 0.95).mean() > 0.05, "caution leaves no name"
 
 
+@pytest.mark.parametrize(("apart", "most_told"), [(0.0, 0.2), (0.02, 1.0), (0.03, 1.0)])
+def test_a_class_that_is_known_better_takes_no_pixels_of_one_that_is_known_less(
+    apart: float, most_told: float
+) -> None:
+    """A pin of one pixel against one of many; deviations are stated too large, as those of results are."""
+    nm, wrong, told = np.arange(430.0, 661.0, 5.0), 0.0, 0.0
+    root = np.linalg.cholesky(np.exp(-0.5 * ((nm[:, None] - nm) / 8.0) ** 2) + 1e-6 * np.eye(len(nm)))
+    material = np.broadcast_to(np.arange(60) // 30, (40, 60))
+    spectra = (np.full(len(nm), 0.2), 0.2 + apart * np.cos(nm / 25))
+    flags = np.zeros(material.shape, np.uint16)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        noise = np.tensordot(root, rng.standard_normal((len(nm), *material.shape)), axes=1)
+        values = (np.moveaxis(np.stack(spectra)[material], -1, 0) + 0.0075 * noise).astype(np.float32)
+        classes = []
+        for name, mean, std in zip("ab", spectra, (0.009, 0.005), strict=True):
+            off = 0.5 * std * (root @ rng.standard_normal(len(nm)))
+            classes.append(SpectralClass(name, (Member.of(mean + off, np.full(len(nm), std)),)))
+        scores = score(values, np.full_like(values, 0.01), None, flags, classes, bands_nm=nm)
+        is_told = scores.margin >= 0.95
+        told += float(is_told.mean()) / 4
+        wrong += float(((scores.best != material) & is_told).mean()) / 4
+    assert told <= most_told
+    if apart:
+        assert told > 0.5
+        assert wrong <= 0.05 * told
+
+
 def test_shades_of_grey_share_no_correlation_though_their_shapes_are_confused() -> None:
     cube = chart_cube(count=2)
     spectra = np.stack([np.full(len(cube.reflectance), level) for level in (0.9, 0.1, 0.1005)])
