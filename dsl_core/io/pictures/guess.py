@@ -107,10 +107,13 @@ def _advice(tried: Sequence[Candidate], looked_at: tuple[Candidate, Look] | None
     first = next((each.pictures[0] for each in tried if each.pictures[0] is not None), None)
     if first is not None and first.path.suffix.lower() in ARRAYS and first.index is not None:
         count, shape = len(tried[0].pictures), load_values(first).shape
+        is_matlab = first.path.suffix.lower() == ".mat"
+        axis, instead = ("first", "0, -1") if is_matlab else ("last", "-1, 0")
         if min(shape) < count:
             return (
-                f"{first.path.name} is taken for {count} pictures of {shape[1]} x {shape[0]} px;"
-                " where its last axis counts the pictures, save numpy.moveaxis(array, -1, 0) instead."
+                f"{first.path.name} is taken for {count} pictures of {shape[1]} x {shape[0]} px; where its"
+                f" {axis} axis counts the pictures, save numpy.moveaxis(array, {instead})"
+                f"{' (permute(array, [2 3 1]) in MATLAB)' if is_matlab else ''} instead."
             )
     if looked_at is not None and (twice := same_in_a_row(looked_at[1].probes.across)):
         one, other = (_picture_name(looked_at[0], place) for place in twice[0])

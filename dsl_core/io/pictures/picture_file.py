@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import MissingPackageError, StoreError
 from dsl_core.io.pictures import array_file, camera_raw, open_exr
+from dsl_core.io.pictures.decoders import decode
 from dsl_core.io.pictures.heads import Head, heads_of
 from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
 from dsl_core.io.pictures.value_scale import SPARKS
@@ -114,6 +115,11 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
     if values.dtype == np.float16:
         # Numbers of so few bits end at 65504, below what white may be.
         values = values.astype(np.float32)
+    if values.dtype.kind == "f" and (unknown := int(np.count_nonzero(np.isnan(values)))):
+        raise StoreError(
+            f"{picture} has {unknown} values that are no numbers (NaN). Replace them: what was too bright by"
+            " white, and what is unknown by 0 in all pictures."
+        )
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
     if values.ndim == 3 and values.shape[2] in (3, 4):
@@ -317,7 +323,6 @@ def _paged_bytes(path: Path, stamp: tuple[int, int]) -> bytes:
 
 
 def _image(path: Path, index: int | None = None) -> NDArray[Any]:
-    import cv2
     from PIL import Image
 
     data = _bytes(path) if index is None else _paged_bytes(path, _stamp(path))
@@ -335,13 +340,8 @@ def _image(path: Path, index: int | None = None) -> NDArray[Any]:
         if width * height > MOST_PIXELS:
             raise StoreError(f"{path} claims {width} x {height} px, which no camera has. Leave it out.")
         # Through memory, because OpenCV cannot open every path on Windows.
-        stored = np.frombuffer(data, np.uint8)
-        if index is None:
-            found = cv2.imdecode(stored, cv2.IMREAD_UNCHANGED)
-        else:
-            pages = cv2.imdecodemulti(stored, cv2.IMREAD_UNCHANGED, None, (index, index + 1))[1]
-            found = pages[0] if pages else None
-    except (OSError, ValueError, SyntaxError, cv2.error) as error:
+        found = decode(data, index, heads[-1] if heads else None)
+    except (OSError, ValueError, SyntaxError) as error:
         raise _damaged(path) from error
     except (Warning, Image.DecompressionBombError) as error:
         raise StoreError(f"{path} claims more pixels than a camera has. Leave it out.") from error
@@ -381,8 +381,8 @@ def _bytes(path: Path) -> bytes:
 
 def _damaged(path: Path) -> StoreError:
     return StoreError(
-        f"{path} cannot be decoded as a picture. Copy it again, or name only good pictures with files of the"
-        " mapping."
+        f"{path} cannot be decoded as a picture: it is damaged, or of a kind that is not read. Copy it again,"
+        " save it as plain PNG or TIFF, or name only good pictures with files of the mapping."
     )
 
 

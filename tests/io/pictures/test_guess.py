@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+import scipy.io
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
@@ -257,6 +258,13 @@ def test_inverses_may_be_in_a_folder_of_their_own(tmp_path: Path, gray: Pictures
 def test_an_array_whose_last_axis_counts_pictures_is_told(tmp_path: Path, gray: Pictures) -> None:
     np.save(tmp_path / "all.npy", np.stack(gray, -1)[:32, :40].astype(np.uint8))
     with pytest.raises(StoreError, match=r"all\.npy is taken for 32 pictures of 16 x 40 px; .*moveaxis"):
+        guess_mapping(tmp_path, PROJECTOR)
+
+
+def test_an_array_of_matlab_whose_first_axis_counts_pictures_is_told(tmp_path: Path, gray: Pictures) -> None:
+    stack = np.stack(gray)[:, :32, :40].astype(np.uint8)
+    scipy.io.savemat(tmp_path / "all.mat", {"frames": stack})
+    with pytest.raises(StoreError, match=r"its first axis counts the pictures, save .*permute"):
         guess_mapping(tmp_path, PROJECTOR)
 
 
