@@ -15,7 +15,7 @@ from dsl_core.io.reading import read_bounded
 
 Floats = NDArray[np.float64]
 Quantity = Literal[
-    "reflectance", "transmittance", "radiance", "irradiance", "counts", "absorbance", "unstated"
+    "reflectance", "transmittance", "radiance", "irradiance", "counts", "absorbance", "derivative", "unstated"
 ]
 #: What is read to recognise a format, and at most of any file.
 HEAD_BYTES, MOST_BYTES = 65_536, 16 << 20

@@ -20,6 +20,8 @@ MOST_SHARE = 2.0
 LEAST_SHARE = -0.9
 #: Radiance without a stated unit above this is something else; with one, above what the Sun's disc has.
 _MOST_UNSTATED, _MOST_RADIANCE = 100.0, 1e5
+#: What becomes a reflectance over the same of a white standard.
+_LIGHT: set[Quantity] = {"counts", "radiance", "irradiance"}
 _CALLED: dict[Quantity, str] = {"reflectance": "reflectance (a share or percent)", "counts": "counts"}
 
 
@@ -66,7 +68,9 @@ def of_kind(
     if not found:
         kinds = sorted({_CALLED.get(each.quantity, each.quantity) for each in spectra})
         needed = f"a spectral radiance. Export radiance in {RADIANCE_UNIT}" if radiance else "a reflectance"
-        way = "" if radiance else ". Divide it by the spectrum of a white standard, or export reflectance"
+        by_white = {each.quantity for each in spectra} <= _LIGHT
+        instead = "Divide it by the spectrum of a white standard, or export" if by_white else "Export"
+        way = "" if radiance else f". {instead} reflectance"
         raise CalibrationError(f"{path.name} contains {' and '.join(kinds)}, not {needed}{way}.")
     return found
 

@@ -51,7 +51,16 @@ _UNIT_LINE = re.compile(r"\W*(?:y[- ]?)?units?\b", re.IGNORECASE)
 #: In the order in which they are tried; a unit of power decides before all of them.
 _WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
     ("irradiance", re.compile(r"irrad|\birr\b", re.IGNORECASE)),
-    ("absorbance", re.compile(r"absorban[cz]|log ?\(1/R\)|kubelka", re.IGNORECASE)),
+    # As those of foods and soils are compared; they are steps between values, of whatever quantity.
+    ("derivative", re.compile(r"derivativ|\bd ?[RA] ?/ ?d ?(?:λ|lambda|nm|wl)", re.IGNORECASE)),
+    ("absorbance", re.compile(r"absorban[cz]|kubelka", re.IGNORECASE)),
+    # "log(1/R)", "log10 (1 / R)", "A = -log10(R)".
+    (
+        "absorbance",
+        re.compile(
+            r"(?<![a-z])log(?:_?10|₁₀)? ?\(? ?1 ?/ ?[RT]\b|[-−–] ?log(?:_?10|₁₀)? ?\(? ?[RT]\b", re.IGNORECASE
+        ),
+    ),
     ("transmittance", re.compile(r"transmi", re.IGNORECASE)),
     ("reflectance", re.compile(r"reflect|reflekt|remission|albedo", re.IGNORECASE)),
     # Of reflectance, absorption may be said in passing, and samples are called "ABS" or "absorptive black":
@@ -113,7 +122,8 @@ def _quantity(text: str, everywhere: bool) -> tuple[Quantity, float, bool]:
     said_percent = everywhere and bool(_PERCENT.search(text) or _PERCENT_R.search(text))
     for quantity, words in _WORDS:
         found = words.search(text)
-        if found is None:
+        # Headers of instruments say of a derivative that there is none.
+        if found is None or (quantity == "derivative" and not everywhere):
             continue
         near = text if everywhere else text[found.start() : found.start() + 40].split("\n")[0]
         before = text[: found.start()].rpartition("\n")[2]

@@ -279,11 +279,28 @@ def test_words_of_samples_are_names(tmp_path: Path, names: list[str]) -> None:
 @pytest.mark.parametrize(
     "title",
     ["Absorbance", "Absorption", "absorption coefficient", "Extinktion", "Extinction", "optical density",
-     "OD", "Abs", "Abs.", "K/S", "Kubelka-Munk"],
+     "OD", "Abs", "Abs.", "K/S", "Kubelka-Munk", "log(1/R)", "log10 (1 / R)", "A=-log10(R)", "-log R"],
 )  # fmt: skip
 def test_absorption_is_no_reflectance(tmp_path: Path, title: str) -> None:
-    with pytest.raises(CalibrationError, match="contains absorbance, not a reflectance"):
+    with pytest.raises(CalibrationError, match=r"absorbance, not a reflectance\. Export reflectance\."):
         read_references(table(tmp_path / "a.csv", f"nm,{title}", NM, LEAF))
+
+
+@pytest.mark.parametrize("title", ["First derivative", "2nd Derivative of reflectance", "dR/dnm"])
+def test_a_derivative_is_no_reflectance(tmp_path: Path, title: str) -> None:
+    with pytest.raises(CalibrationError, match="contains derivative, not a reflectance"):
+        read_references(table(tmp_path / "a.csv", f"nm,{title}", NM, LEAF))
+
+
+def test_a_header_that_knows_of_derivatives_leaves_reflectance_what_it_is(tmp_path: Path) -> None:
+    path = table(tmp_path / "a.csv", "Derivative: none\nnm,catalog T", NM, LEAF)
+    (found,) = read_references(path).references
+    np.testing.assert_allclose(found.curve.values, LEAF, rtol=1e-5)
+
+
+def test_counts_become_reflectance_over_those_of_a_white(tmp_path: Path) -> None:
+    with pytest.raises(CalibrationError, match=r"counts, not a reflectance\. Divide it by the spectrum of a"):
+        read_references(table(tmp_path / "a.csv", "nm,counts", NM, LEAF))
 
 
 @pytest.mark.parametrize(
