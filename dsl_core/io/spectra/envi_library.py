@@ -35,15 +35,18 @@ _NANOMETRES |= dict.fromkeys(("microns", "micron"), 1e3)
 _FIELD = re.compile(r"^([^=;{}\n]+)=[ \t]*(\{[^{}]*\}|[^\n]*)", re.MULTILINE)
 #: Digits of a whole number, and values of a library, that no instrument reaches.
 _MOST_DIGITS, _MOST_VALUES = 12, 100_000_000
+#: What a header calls the factor that its values were multiplied by.
+_SCALE = "reflectance scale factor"
 #: Reflectance above this can only be a percentage, above a hundred times this only a count of unstated scale.
 MOST = 2.0
 
 
-def read_library(path: Path) -> tuple[Floats, list[str], Floats]:
+def read_library(path: Path) -> tuple[Floats, list[str], Floats, bool]:
     """Wavelengths (nm, rising), names, and reflectance (spectra, bands) of a library; NaN for no value.
 
-    ``path`` is the header or the data. Micrometres are converted where the header says so, a stated scale
-    is divided by, and bands that ``bbl`` marks as bad have no values; at the ends they are left out. Raises
+    The last says whether the header states a scale, so that values are shares; else they may be percent.
+    ``path`` is the header or the data. Micrometres are converted where the header says so, and a stated scale
+    is divided by. Bands that ``bbl`` marks as bad have no values; at the ends they are left out. Raises
     `CalibrationError` that names the file.
     """
     header_path, data_path = _pair(path)
@@ -63,7 +66,7 @@ def read_library(path: Path) -> tuple[Floats, list[str], Floats]:
     # What is bad at the ends was not measured; in the midst it is a gap, and nobody may bridge it.
     known = np.flatnonzero(is_good[order])
     order = order[known[0] : known[-1] + 1]
-    return nm[order], _names(header, len(values)), values[:, order]
+    return nm[order], _names(header, len(values)), values[:, order], _SCALE in header
 
 
 def _pair(path: Path) -> tuple[Path, Path]:
@@ -187,7 +190,7 @@ def _reflectance(path: Path, header: Mapping[str, str], nm: Floats, values: Floa
     """Values as shares of light; NaN for what the header or an absurd number marks as deleted."""
     deleted = ~(np.abs(values) < MOST_NUMBER)
     try:
-        scale = float(header.get("reflectance scale factor", 1.0))
+        scale = float(header.get(_SCALE, 1.0))
         if "data ignore value" in header:
             # Data in 32 bits has not all digits of the header.
             deleted |= np.isclose(values, float(header["data ignore value"]), rtol=1e-6, atol=0.0)
@@ -200,6 +203,6 @@ def _reflectance(path: Path, header: Mapping[str, str], nm: Floats, values: Floa
     if most > 100 * MOST:
         raise CalibrationError(
             f"{path.name} contains values up to {most:g}; reflectance from 0 to 1 is needed. Add the factor"
-            " that they were multiplied by to the header, as 'reflectance scale factor'."
+            f" that they were multiplied by to the header, as {_SCALE!r}."
         )
-    return values * (0.01 if most > MOST else 1.0)
+    return values * (0.01 if most > MOST and _SCALE in header else 1.0)

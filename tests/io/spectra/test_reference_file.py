@@ -255,3 +255,16 @@ def test_a_dark_spectrum_of_a_file_in_percent_is_percent_too(tmp_path: Path) -> 
     assert found.as_percent == 90
     path.write_text(path.read_text().replace(",90,1.5", ",0.9,0.015"))
     assert read_references(path).as_percent is None
+
+
+def test_a_library_without_a_scale_says_that_it_was_taken_for_percent(tmp_path: Path) -> None:
+    path = write_library(tmp_path / "a.sli")
+    assert read_references(path).as_percent is None
+    path.write_bytes(np.stack([GRASS * 100, BRICK * 2]).astype("<f4").tobytes())
+    found = read_references(path)
+    assert found.as_percent == pytest.approx(40.0)
+    np.testing.assert_allclose(found.references[0].curve.values, GRASS, rtol=1e-5)
+    np.testing.assert_allclose(found.references[1].curve.values, BRICK / 50, rtol=1e-5)
+    stated = write_library(tmp_path / "b.sli", {"reflectance scale factor": 1})
+    stated.write_bytes(np.stack([GRASS * 2.5, BRICK]).astype("<f4").tobytes())
+    assert read_references(stated).as_percent is None

@@ -12,8 +12,8 @@ SUFFIXES = (".sli", ".hdr")
 
 def read_envi(path: Path) -> list[Spectrum]:
     """Every spectrum of a library; raises `CalibrationError`."""
-    nm, names, values = read_library(path)
-    return [Spectrum(name, nm, each, "reflectance", True) for name, each in zip(names, values, strict=True)]
+    nm, names, values, scaled = read_library(path)
+    return [Spectrum(name, nm, each, "reflectance", scaled) for name, each in zip(names, values, strict=True)]
 
 
 FORMAT = Format(
