@@ -108,30 +108,31 @@ class SceneCheck:
         channels = known.raster.channels(known.bayer)
         return edges_moved(seen, before, known.code_pairs(), known.noise, known.raster.shape, channels)
 
-    def whites(self) -> tuple[Shot, Shot] | None:
-        """White of the first code, and white at half its level, by which `compare_whites` knows the levels.
+    def whites(self) -> tuple[Shot, Shot, Shot] | None:
+        """White of the first code, that at half its level, and black, by which `compare_whites` knows levels.
 
-        None before that white is there, and without a calibration.
+        None before they are there, and without a calibration.
         """
         known = self._known
         white = known.places.get(("white", 0), -1)
         if known.calibration is None or not known.knows_light or known.ends(known.first) is None:
             return None
-        return known.shots[white], at_half_level(known.shots[white])
+        return known.shots[white], at_half_level(known.shots[white]), known.shots[known.places["black", 0]]
 
-    def compare_whites(self, dim: NDArray[np.uint16], white: NDArray[np.uint16] | None = None) -> bool:
+    def compare_whites(self, dim: Mosaic, now: tuple[Mosaic, Mosaic] | None = None) -> bool:
         """Whether a raw mosaic of white at half its level has the light that the calibration says.
 
-        ``white`` is one at its full level, or else that of the scan. What is wrong is kept as ``levels``.
+        ``now`` are white at its full level and black of the same time, or else those of the scan count. What
+        is wrong is kept as ``levels``.
         """
         known = self._known
         ends = known.ends(known.first)
         if known.calibration is None or ends is None:
             return True
-        bright = ends[0] if white is None else known.raster.take(white)
+        bright, black = ends if now is None else (known.raster.take(each) for each in now)
         self.levels = doubt_of_levels(
             bright,
-            ends[1],
+            black,
             known.raster.take(dim),
             known.plan.settings[known.first].level,
             known.calibration.projector_response,

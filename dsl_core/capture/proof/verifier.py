@@ -162,8 +162,8 @@ class FrameProof:
         return (
             f"The first pictures of the code had {ratio:.2f} times the light of those since, and were"
             " captured again. If the light was as calibrated at first, reflectances are off by as much: let"
-            " the projector warm up for longer, and switch automatic exposure and gain of the camera, and"
-            " night mode of projector and computer, off."
+            " the projector warm up for longer, keep the light of the room as it is, and switch automatic"
+            " exposure and gain of the camera, and night mode of projector and computer, off."
         )
 
     def recall(self, shot: Shot, why: str) -> None:

@@ -364,11 +364,13 @@ class ProvenShots:
         shots = proof.scene.whites()
         if shots is None:
             return
-        white, dim = shots
+        white, dim, black = shots
         if proof.scene.compare_whites(self._taker.take(dim, twice=self._is_late).seen):
             return
-        # The picture may be late, and the light may have changed since white.
-        if not proof.scene.compare_whites(self._again(dim).seen, self._again(white).seen):
+        # The picture may be late, and the light of lamp and room may have changed since white.
+        if not proof.scene.compare_whites(
+            self._again(dim).seen, (self._again(white).seen, self._again(black).seen)
+        ):
             _log.warning("%s", proof.scene.levels)
 
     def _require_place(self, first: Shot, proof: FrameProof) -> None:

@@ -13,6 +13,7 @@ from dsl_core.capture.proof.scene_check import SceneCheck
 from dsl_core.model.plan import Shot
 from dsl_core.patterns.images import pattern_image
 from tests.cases.proof_rules import PLAN, SHOTS, counts, known
+from tests.cases.small_rig import small_rig
 
 
 def test_there_are_no_controls_before_the_code() -> None:
@@ -142,3 +143,25 @@ def test_pictures_that_hold_those_before_them_are_told_by_the_first_black(
     assert said == check.unsettled
     assert said.startswith("Black, captured after white, holds 2.9% of the light of white") is is_mixed
     assert taken == [("black", True), ("white", False), ("black", False)][: 1 if first == 300 else 3]
+
+
+@pytest.mark.parametrize(
+    ("room_dn", "times", "is_off"),
+    [(0, 1.0, False), (0, 1.7, True), (90, 1.0, False), (90, 1.7, True)],
+    ids=["as calibrated", "other levels", "sun came out", "both"],
+)
+def test_light_of_the_room_that_changed_is_no_change_of_levels(
+    room_dn: int, times: float, is_off: bool
+) -> None:
+    scan: Any = known()
+    rig = small_rig()
+    scan.calibration, scan.knows_light, scan.bayer = rig, True, "RGGB"
+    response, level = rig.projector_response, scan.plan.settings[scan.first].level
+    full, half = (float(response.radiance(x)) - response.black_fraction for x in (level, level / 2))
+    black, contrast = 300, 1000
+    scan.kept = {10: counts(black + contrast), 11: counts(black)}
+    scan.ends = lambda setting: (scan.kept[10], scan.kept[11])
+    dim = counts(round(black + room_dn + times * contrast * half / full)).reshape(18, 32)
+    now = tuple(counts(each + room_dn).reshape(18, 32) for each in (black + contrast, black))
+    check = SceneCheck(scan)
+    assert check.compare_whites(dim, (now[0], now[1])) is not is_off

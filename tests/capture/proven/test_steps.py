@@ -52,7 +52,7 @@ class Bench:
         self.unproven = ""
         #: How often white at half its level is compared, and what that says.
         self.whites_seen, self.levels = list[bool](), ""
-        self.mixed = ""
+        self.mixed = self.coarse = ""
         self.recalled: dict[int, str] = {}
         self.chosen: tuple[Shot, ...] = (SHOTS[0], SHOTS[4])
         #: So many of the next controls are wrong, whatever is the matter.
@@ -80,6 +80,9 @@ class Bench:
 
     def code_sum(self) -> CodeSum | None:
         return self.of_code
+
+    def coarse_values(self) -> str:
+        return self.coarse
 
     def lasting(self, with_colours: bool = True) -> list[str]:
         # Colours are left out: a filter of a calibration may take them away.
@@ -152,10 +155,10 @@ class Bench:
     def see_mixed(self, take: Callable[[Shot, bool], object]) -> str:
         return self.mixed
 
-    def whites(self) -> tuple[Shot, Shot] | None:
-        return (SHOTS[10], replace(SHOTS[10], level=0.5)) if self.whites_seen else None
+    def whites(self) -> tuple[Shot, Shot, Shot] | None:
+        return (SHOTS[10], replace(SHOTS[10], level=0.5), SHOTS[11]) if self.whites_seen else None
 
-    def compare_whites(self, dim: object, white: object = None) -> bool:
+    def compare_whites(self, dim: object, now: object = None) -> bool:
         return self.whites_seen.pop(0)
 
     def code_after(self, first: Shot) -> tuple[Shot, ...]:
@@ -260,6 +263,13 @@ def test_that_no_picture_could_be_judged_is_said_at_the_end() -> None:
     assert bench.shots.note == " The code is dark."
 
 
+def test_values_of_few_bits_are_said_before_what_they_make_of_light() -> None:
+    bench = Bench(is_right)
+    bench.displaced, bench.coarse, bench.of_ends = [False], "Values come in steps.", ["Black is grey."]
+    bench.shots.take(LINE)
+    assert bench.shots.note == " Values come in steps. Black is grey."
+
+
 def test_what_was_wrong_from_the_first_picture_on_is_said_at_the_end() -> None:
     bench = Bench(is_right, late)
     bench.displaced, bench.of_ends = [False], ["Black is grey.", "Rows alternate."]
@@ -276,8 +286,8 @@ def test_what_was_wrong_from_the_first_picture_on_is_said_at_the_end() -> None:
     ("seen", "taken"),
     [
         ([True], [(0, 0), (10, 0), (13, 0)]),
-        ([False, True], [(0, 0), (10, 0), (10, 1), (10, 1), (13, 0)]),
-        ([False, False], [(0, 0), (10, 0), (10, 1), (10, 1), (13, 0)]),
+        ([False, True], [(0, 0), (10, 0), (10, 1), (10, 1), (11, 1), (13, 0)]),
+        ([False, False], [(0, 0), (10, 0), (10, 1), (10, 1), (11, 1), (13, 0)]),
     ],
 )
 def test_white_at_half_its_level_is_compared_before_the_first_line_twice_if_it_is_wrong(

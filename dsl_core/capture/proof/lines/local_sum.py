@@ -67,9 +67,11 @@ class LocalSum:
         if is_below_none(self.share, self.std):
             return f"Lines {seen}{LESS_THAN_NONE}"
         if self.all_rows:
+            missing = "all they lit was in a shadow or smoke"
+            more = "other light came in (a torch, a door, somebody next to the object)"
             return (
                 f"Lines {seen}, and others have not: the light of the projector changed for them (eco mode,"
-                " iris, the lamp), or all they lit was in a shadow or smoke. Switch eco mode and dynamic"
+                f" iris, the lamp), or {more if self.share > 1 else missing}. Switch eco mode and dynamic"
                 " contrast off, keep the way of the light free, and scan again."
             )
         return (
