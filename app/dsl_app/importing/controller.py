@@ -94,8 +94,9 @@ class ImportController:
                 done(found)
 
         def failed(error: Exception) -> None:
-            self.state.trouble.set(sentence_of(error))
-            self._notifier.tell("error", sentence_of(error))
+            if number == self._looks:
+                self.state.trouble.set(sentence_of(error))
+                self._notifier.tell("error", sentence_of(error))
 
         def ended() -> None:
             if number == self._looks:

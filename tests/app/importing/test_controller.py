@@ -251,15 +251,17 @@ def test_a_base_that_is_gone_is_told(bench: Bench, made: Folders, tmp_path: Path
     assert bench.state.busy.value == ""
 
 
-def test_a_look_that_was_overtaken_says_nothing(made: Folders, tmp_path: Path) -> None:
-    runner, state = Waiting(), ImportState()
-    control = ImportController(state, runner, RecordingNotifier(), CalibrationLibrary(tmp_path / "library"))
-    control.look(made.scene, tmp_path)
+@pytest.mark.parametrize("is_gone", [False, True])
+def test_a_look_that_was_overtaken_says_nothing(made: Folders, tmp_path: Path, is_gone: bool) -> None:
+    runner, state, notifier = Waiting(), ImportState(), RecordingNotifier()
+    control = ImportController(state, runner, notifier, CalibrationLibrary(tmp_path / "library"))
+    control.look(tmp_path / "gone" if is_gone else made.scene, tmp_path)
     control.look(made.rig, tmp_path)
     for job in reversed(runner.jobs):
         job.run()()
     assert state.found.value is not None
     assert state.found.value.folder == made.rig
+    assert (state.trouble.value, notifier.told) == ("", [])
 
 
 def test_the_command_line_does_the_same(
