@@ -77,6 +77,10 @@ class SearchPanel(QWidget):
         ):
             self._limit()
             return
+        if search is not None and search.mode is not self._chosen:
+            # Chosen while the search ran: what is shown is what the panel says.
+            self._control.set_mode(self._chosen)
+            return
         self.text.setText(search_text(search))
 
 
