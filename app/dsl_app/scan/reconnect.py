@@ -121,9 +121,15 @@ class Reconnector:
     def _take_link(self, link: Link) -> None:
         """Note that a rig is connected, whoever did it; only the lost rig resumes the scan."""
         rescue = self._state.reconnection.value
-        if link is Link.OPEN and rescue.is_away:
-            self._resumes = rescue is Reconnection.RESUMING
-            self._tell(Reconnection.BACK, "The rig is reconnected.")
+        if link is not Link.OPEN or not rescue.is_away:
+            return
+        self._resumes = rescue is Reconnection.RESUMING
+        now = self._rig.state.choice.value
+        is_back = now == self._choice
+        self._tell(
+            Reconnection.BACK,
+            "The rig is reconnected." if is_back else f"Another rig is connected instead: {now.words}.",
+        )
 
     def _tell(self, rescue: Reconnection, text: str) -> None:
         self._state.reconnection.set(rescue)

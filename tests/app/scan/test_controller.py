@@ -843,6 +843,18 @@ def test_a_rig_that_comes_back_goes_on_only_when_asked(outage: Outage) -> None:
     assert (phase(bench), outage.told) == (Phase.DONE, "")
 
 
+def test_another_rig_does_not_pass_for_the_one_that_was_lost(outage: Outage) -> None:
+    outage.is_gone = False
+    outage.bench.rig.connect(RigChoice("twin", (("scene", "sphere"), ("size", "32x24"))))
+    assert outage.reconnection is Reconnection.BACK
+    assert outage.told.endswith("Another rig is connected instead: twin, scene sphere, size 32x24.")
+    assert phase(outage.bench) is Phase.LOST
+    outage.bench.scans.resume()
+    assert phase(outage.bench) is Phase.DONE
+    assert outage.bench.rig.state.choice.value.name == "twin"
+    assert dict(outage.bench.rig.state.choice.value.options)["scene"] != "sphere"
+
+
 def test_who_wishes_so_finds_the_scan_gone_on(outage: Outage) -> None:
     bench = outage.bench
     bench.scans.resume()
