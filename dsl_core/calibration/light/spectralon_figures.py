@@ -22,6 +22,9 @@ LOOK_UNEVEN_PERCENT = 25.0
 #: A bulge over 300 mm: this one tilts the target's sides by half a degree, and corners of the flat field are
 #: off by .9 %.
 BULGE_MM = 1.0
+#: Deviation of the camera's gain (%) anywhere that the projector lights: beyond the target it only follows
+#: from its course on it, and reflectances there are off by as much.
+GAIN_PERCENT = 2.0
 
 
 def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:
@@ -157,6 +160,7 @@ def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
             advice="Fill more of the picture with the Spectralon and expose longer.",
         ),
         Figure(name="range of the flat field", value=100 * float(np.ptp(gain)), unit="%"),
+        *_beyond_target(record),
         *light_change_figure(record.light_change),
         *bulge_figure("bulge of the Spectralon over 300 mm", record.bulge_mm, BULGE_MM),
         Figure(
@@ -166,3 +170,20 @@ def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
             std=100 * record.reflectance_rel_std * float(np.mean(record.reflectance.values)),
         ),
     ]
+
+
+def _beyond_target(record: SpectralonCalibration) -> tuple[Figure, ...]:
+    """How well the flat field is known where the target did not reach; none in older records."""
+    if record.flat_field_unsure is None:
+        return ()
+    return (
+        Figure(
+            name="deviation of the flat field, where it is known least",
+            value=100 * record.flat_field_unsure,
+            unit="%",
+            high=GAIN_PERCENT,
+            advice="The Spectralon fills too little of the picture, and the camera's gain beyond it is a"
+            " guess. Place it nearer to the camera (depth_mm), use a larger one, or trust no reflectance"
+            " beyond the part of the picture that it filled.",
+        ),
+    )

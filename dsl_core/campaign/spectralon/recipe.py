@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dsl_core.calibration.common.plane import bulge_mm
+from dsl_core.calibration.light.beyond_target import unsure_gain
 from dsl_core.calibration.light.emission import measured_emission
 from dsl_core.calibration.light.spectralon import (
     UniformPictures,
@@ -74,7 +75,7 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
         place = Placement(target="spectralon", film=False, options={"depth_mm": depth_mm})
         where = (
             f"Take the film off. Place the Spectralon about {depth_mm / 10:g} cm from the camera, facing"
-            " it, so that it fills at least the middle half of the picture."
+            " it, so that it fills the picture, or its middle half at the very least."
         )
         aim = " Aim the spectroradiometer at the middle of the Spectralon."
         return (
@@ -167,6 +168,9 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
         return record.model_copy(
             update={
                 "reflectance_rel_std": self.reflectance_rel_std,
+                "flat_field_unsure": unsure_gain(
+                    bench.rig, found.plane, record.flat_field, record.flat_field_std
+                ),
                 "light_change": target.light_change(uniform.usable),
                 "bulge_mm": bulge_mm(bench.rig, target.depth_mm, found),
             }

@@ -81,11 +81,12 @@ class SpectralonCalibration(Record):
 
     Shares are of the pixels in the middle half of the image that the projector reaches. ``unevenness`` is the
     rms of the white signal, in blocks, about its smooth part, the ``flat_field`` (mean one, deviations
-    ``flat_field_std`` at its nodes); ``flat_field_chi_square`` is that of an even camera, reduced.
+    ``flat_field_std`` at its nodes, of which ``flat_field_unsure`` is the largest where the projector lights
+    the picture, target or not); ``flat_field_chi_square`` is that of an even camera, reduced.
     ``reflectance_rel_std`` is the relative deviation of the stated reflectance (0 in older records).
     ``light_change`` is by how much the light of the room changed during the pictures, over white, and
-    ``bulge_mm`` by how much the target bulges towards the camera over 300 mm, each with its deviation (None
-    in older records).
+    ``bulge_mm`` by how much the target bulges towards the camera over 300 mm, each with its deviation. All of
+    these are None in older records.
     """
 
     schema_version: Literal[1] = 1
@@ -100,5 +101,6 @@ class SpectralonCalibration(Record):
     flat_field: FlatField
     flat_field_std: tuple[tuple[float, ...], ...]
     flat_field_chi_square: float
+    flat_field_unsure: float | None = None
     light_change: tuple[float, float] | None = None
     bulge_mm: tuple[float, float] | None = None

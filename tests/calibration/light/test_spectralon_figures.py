@@ -69,6 +69,7 @@ def record() -> SpectralonCalibration:
         flat_field=FlatField(rows_px=(0.0, 1.0), columns_px=(0.0, 1.0), gain=((0.9, 1.0), (1.0, 1.15))),
         flat_field_std=((0.0, 0.0), (0.0, 0.0)),
         flat_field_chi_square=1.0,
+        flat_field_unsure=0.012,
         light_change=(0.001, 1e-5),
         bulge_mm=(-1.5, 0.5),
     )  # fmt: skip
@@ -88,6 +89,7 @@ def test_a_calibration_is_judged_by_its_figures_and_their_limits() -> None:
         "white over red + green + blue in the pictures, largest difference": (3.0, None, 2.0, "%"),
         "deviation of white": (100 * np.hypot(0.01, 0.02) / 6, None, 0.5, "%"),
         "range of the flat field": (25.0, None, None, "%"),
+        "deviation of the flat field, where it is known least": (1.2, None, 2.0, "%"),
         "change of ambient light during the pictures": (0.1, -0.2, 0.2, "% of white"),
         "bulge of the Spectralon over 300 mm": (-1.5, -2.0, 2.0, "mm"),
         "stated reflectance of the Spectralon, which no picture shows": (250.0, None, None, "%"),
