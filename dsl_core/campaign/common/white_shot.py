@@ -93,6 +93,8 @@ def shoot_white(bench: Bench) -> WhiteLevel:
     for colour in mosaic_colours(rig.sensor.bayer):
         mean[colour] = rate[colours == colour].mean()
     dark = float(np.median(black)) - rig.sensor.black_level_dn
+    if 100 * dark > MOST_OTHER * peak:
+        dark = _light_of_room(devices, dark, float(np.median(black)), exposure_ms)
     return WhiteLevel(
         float(np.quantile(rate, 1 - BRIGHTEST_SHARE)),
         mean,
@@ -101,6 +103,19 @@ def shoot_white(bench: Bench) -> WhiteLevel:
         rate,
         level,
     )
+
+
+def _light_of_room(devices: DeviceRig, dark: float, seen_dn: float, exposure_ms: float) -> float:
+    """What the room adds to black in an exposure, DN, if not all of ``dark``.
+
+    ``seen_dn`` is the median of black. A black level that is not that of the data sheet is there in the
+    shortest exposure as well, where light of the room is not.
+    """
+    short_ms = devices.camera.configure(devices.camera.info.exposure_range_ms[0])
+    if short_ms > exposure_ms / 2:
+        return dark
+    level_dn = float(np.median(_snap(devices, 0, _ATTEMPTS)))
+    return min(dark, (seen_dn - level_dn) * exposure_ms / (exposure_ms - short_ms))
 
 
 def _longest_share(rig: Rig, white: WhiteLevel) -> float:

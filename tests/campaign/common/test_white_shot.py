@@ -22,8 +22,10 @@ from dsl_core.campaign.common.white_shot import (
     require_width,
     shoot_white,
 )
+from dsl_core.devices.base import Camera, CameraInfo
 from dsl_core.errors import CalibrationError, DeviceError
 from dsl_core.model.figure import failures
+from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
@@ -60,6 +62,41 @@ def test_the_projector_alone_waits_for_its_latency(bench: Bench) -> None:
     assert shot.brightest > shot.mean.max() > 0
     assert not shot.saturated
     assert not failures(film_light(shot, bench.rig))
+
+
+class Brighter(Camera):
+    """Adds a constant to every picture, and light of the room, DN per ms, to what it lights meanwhile."""
+
+    def __init__(self, camera: Camera, constant_dn: float = 0.0, room_dn_per_ms: float = 0.0) -> None:
+        self.camera, self.constant_dn, self.room = camera, constant_dn, room_dn_per_ms
+
+    @property
+    def info(self) -> CameraInfo:
+        return self.camera.info
+
+    def configure(self, exposure_ms: float) -> float:
+        self.exposure_ms = self.camera.configure(exposure_ms)
+        return self.exposure_ms
+
+    def snap(self, timeout_ms: float = 5000.0) -> Frame:
+        frame = self.camera.snap(timeout_ms)
+        added = self.constant_dn + self.room * self.exposure_ms
+        return replace(frame, pixels=np.minimum(frame.pixels + added, 4095).astype(np.uint16))
+
+
+def test_a_black_level_that_no_data_sheet_states_is_no_light_of_the_room(bench: Bench) -> None:
+    place(bench, Placement(target="spectralon", film=True))
+
+    def seen(**more: float) -> WhiteLevel:
+        camera = Brighter(bench.devices.camera, **more)
+        return shoot_white(replace(bench, devices=replace(bench.devices, camera=camera)))
+
+    dark, high = seen(), seen(constant_dn=1000.0)
+    assert high.ambient == pytest.approx(dark.ambient, abs=0.01)
+    assert not failures(film_light(high, bench.rig))
+    lit = seen(room_dn_per_ms=0.3 * dark.brightest)
+    (told,) = failures(film_light(lit, bench.rig))
+    assert told.name == "ambient light"
 
 
 def test_a_monochrome_camera_has_the_mean_of_its_one_colour(bench: Bench) -> None:
