@@ -191,7 +191,9 @@ def _check_axes(poses: Sequence[PoseObservation]) -> None:
     typical = np.abs(slopes[mirrored]).mean(0)
     if typical[0, 1] + typical[1, 0] > typical[0, 0] + typical[1, 1]:
         cause = (
-            "the axes are swapped: rows of the projector are decoded as columns. Show the columns' bits first"
+            "either the axes are swapped, and rows of the projector are decoded as columns: show the columns'"
+            " bits first. Or the camera is turned by a right angle, and one of both pictures is mirrored:"
+            " switch off the mirroring of both (rear or ceiling mode of the projector)"
         )
     else:
         axis = "left to right" if slopes[mirrored][:, 0, 0].mean() < 0 else "top to bottom"
