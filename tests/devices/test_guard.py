@@ -339,12 +339,12 @@ def test_rows_are_missing_though_some_pixels_of_others_have_no_count(
     rig = guarded(DeviceRig("lab", lab, beam), DeviceThread("lab"))
     pixels = np.full((40, 200), 64, np.uint16)
     pixels[30:] = 0
-    place = {
+    places: dict[str, tuple[int, int | slice]] = {
         "dead pixel": (5, 7),
         "dead pixel in the first row": (0, 9),
         "cut within a row": (29, slice(90, 200)),
     }
-    pixels[place[flaw]] = 0
+    pixels[places[flaw]] = 0
     lab.act["snap"] = partial(replace, FRAME, pixels=pixels)
     rig.camera.configure(10.0)
     for _ in range(3):

@@ -202,7 +202,8 @@ def test_the_coarsest_digit_of_half_a_projector_is_no_white_taken_twice() -> Non
     levels = [captured_levels(code, PROJECTOR, index) for index in range(14)]
     levels += [np.ones((96, 128)), np.zeros((96, 128))]
     pictures = [half.picture(each, k, 8) for k, each in enumerate(levels)]
-    for most_bits in (None, {"columns": 7, "rows": 7}):
+    limits: tuple[Mapping[Axis, int] | None, ...] = (None, {"columns": 7, "rows": 7})
+    for most_bits in limits:
         reading = _stripes(_recognised(pictures, most_bits=most_bits), "columns")
         assert (reading.bits, reading.rises) == (7, True)
         assert reading.numbers[0] >= 64

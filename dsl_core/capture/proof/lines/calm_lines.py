@@ -63,7 +63,7 @@ def calm_lines(lines: Sequence[Shot], kept: Mapping[int, Counts], noise: Noise) 
 
 
 def _sigma(kept: Mapping[int, Counts], one: Shot, other: Shot, noise: Noise) -> NDArray[np.float32]:
-    return np.sqrt(noise.variance(kept[one.index]) + noise.variance(kept[other.index]))
+    return np.asarray(np.sqrt(noise.variance(kept[one.index]) + noise.variance(kept[other.index])))
 
 
 def _deviation(apart: NDArray[np.floating]) -> float:
