@@ -99,8 +99,9 @@ def read_spectra(path: FilePath) -> dict[str, xr.DataArray]:
     """Reflectances of a spectroradiometer's or this program's file, by name, over ``wavelength_nm``.
 
     ASD, SVC, Spectral Evolution, Ocean, Avantes, CS-2000, JCAMP-DX, CGATS, ENVI libraries and tables of text
-    are known; a spectrum without a name has that of the file. To compare one with a result, average it over
-    its bands::
+    are known; a spectrum without a name has that of the file. The attribute ``notes`` of each lists what was
+    made of the file: values read as percent, taken as deleted, or left out; empty where nothing was. To
+    compare one with a result, average it over its bands::
 
         tile = result.dsl.at_bands(dsl.read_spectra("tile.csv")["tile"])
         off = result.dsl.region((48, 28, 6, 5))["reflectance"] - tile
@@ -111,10 +112,14 @@ def read_spectra(path: FilePath) -> dict[str, xr.DataArray]:
 
     from dsl_core.io.spectra.reference_file import read_references
 
-    over = "wavelength_nm"
+    over, found = "wavelength_nm", read_references(path_of(path))
     return {
         (each.name or path_of(path).stem): xr.DataArray(
-            list(each.curve.values), {over: list(each.curve.wavelengths_nm)}, (over,), name="reflectance"
+            list(each.curve.values),
+            {over: list(each.curve.wavelengths_nm)},
+            (over,),
+            name="reflectance",
+            attrs={"notes": list(found.all_notes)},
         )
-        for each in read_references(path_of(path)).references
+        for each in found.references
     }

@@ -60,6 +60,20 @@ def test_what_a_result_does_not_state_is_unknown_and_the_rest_is_told(
     assert dsl.read_spectra(tmp_path / "a.csv")["pixel"].notnull().all()
 
 
+def test_what_was_made_of_a_file_of_spectra_is_noted(tmp_path: Path) -> None:
+    """A script shows no messages: values that are a hundredth of those in the file must say so."""
+    rows = [f"{nm},{20 + nm / 100},{-999 if nm == 500 else 90}" for nm in range(400, 701, 10)]
+    (tmp_path / "percent.csv").write_text("\n".join(("nm,leaf,tile", *rows)))
+    (tmp_path / "shares.csv").write_text("\n".join(("nm,leaf", *(f"{nm},0.2" for nm in range(400, 701, 10)))))
+    found = dsl.read_spectra(tmp_path / "percent.csv")
+    for each in found.values():
+        deleted, percent = each.attrs["notes"]
+        assert "taken as deleted: 1" in deleted
+        assert percent == "values up to 90 are read as percent."
+    (plain,) = dsl.read_spectra(tmp_path / "shares.csv").values()
+    assert plain.attrs["notes"] == []
+
+
 def test_bands_alone_are_a_result_as_well(result: xr.Dataset) -> None:
     less = result[["reflectance"]]
     assert (

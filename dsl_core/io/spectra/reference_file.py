@@ -40,6 +40,15 @@ class ReferenceFile:
     as_percent: float | None = None
     notes: tuple[str, ...] = ()
 
+    @property
+    def all_notes(self) -> tuple[str, ...]:
+        """A sentence on each thing that was made of the file or left out of it, percent among them."""
+        percent = (
+            None if self.as_percent is None else f"values up to {self.as_percent:.3g} are read as percent."
+        )
+        empty = f"without values and left out: {', '.join(self.empty[:5])}." if self.empty else None
+        return (*self.notes, *(each for each in (percent, empty) if each is not None))
+
 
 def read_references(path: Path) -> ReferenceFile:
     """All reflectances of a file, whatever range they cover; raises `CalibrationError`."""
