@@ -53,6 +53,11 @@ _UNITS_MM = {
 }  # fmt: skip
 #: Any other lengths are those of a distortion that has to be refused, if not of a matrix or a lone distance.
 _COEFFICIENTS = set(range(2, 100)) - {9}
+#: What numbers of a lens may be nested in.
+_WITHIN = "(?:intrinsics?)?"
+#: Focal lengths and principal point: a name for each number, or for two as in MATLAB and its toolboxes.
+_LENGTHS = ("fx", "fy", "(?:cx|ppx)", "(?:cy|ppy)")
+_PAIRS_OF_LENGTHS = ("(?:fc|focallength)", "(?:cc|principalpoint)")
 #: Coefficients that have a name each, in OpenCV's order.
 _TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
@@ -107,7 +112,7 @@ def size_of(numbers: Numbers, device: str) -> tuple[int, int] | None:
         "(?:projector|proj|cam1|cameraparameters2|screen|screenres)"
     )  # fmt: skip
     for rows_first, words in ((False, "(?:imagesize|resolution|size|sizepx)"), (True, "(?:img|image)shape")):
-        name = _named(numbers, rf"{who}{words}", {2})
+        name = _named(numbers, rf"{who}{_WITHIN}{words}", {2})
         if name is not None:
             first, second = (int(each) for each in numbers[name].ravel())
             swapped = rows_first or "cameraparameters" in _plain(name)
@@ -151,7 +156,29 @@ def _add_lens(found: Parts, numbers: Numbers, device: str, who: str, alone: str 
     name = found.find(numbers, words, {9}) or found.find(lengths, words, {4})
     if name is not None:
         _add_matrix(found, f"{device} matrix", name, numbers[name].ravel())
+    else:
+        _add_lengths(found, numbers, f"{device} matrix", f"{who}(?:{_MATRIX})?", who)
     _add_distortion(found, {n: v for n, v in numbers.items() if n not in lengths}, device, who, alone)
+
+
+def _add_lengths(found: Parts, numbers: Numbers, part: str, own: str, who: str) -> None:
+    """Focal lengths and principal point that have names of their own, one or two numbers each."""
+    sets = [[found.find(numbers, f"{own}{term}|{term}{who}", {1}) for term in _LENGTHS]]
+    sets += [[found.find(numbers, f"{own}{term}|{term}{who}", {2}) for term in _PAIRS_OF_LENGTHS]]
+    names = next(([name for name in each if name] for each in sets if None not in each), None)
+    if names is None:
+        return
+    values = np.concatenate([numbers[name].ravel() for name in names])
+    fx, fy, cx, cy = values
+    # A toolbox states the slope of the axes instead of the skew in px.
+    ways = (("skew", 1.0), ("alphac", fx))
+    skews = [(found.find(numbers, f"{own}{term}|{term}{who}", {1}), unit) for term, unit in ways]
+    skew = next((numbers[name].item() * unit for name, unit in skews if name), 0.0)
+    # MATLAB counts pixels from 1.
+    first = float("cameraparameters" in _plain(names[0]))
+    found.add(part, ", ".join(names), np.array([[fx, skew, cx - first], [0, fy, cy - first], [0, 0, 1]]))
+    if first:
+        found.taken.append(f"{names[-1]} is written as in MATLAB: with pixels from 1")
 
 
 def _are_lengths(values: NDArray[np.float64]) -> bool:
@@ -161,21 +188,23 @@ def _are_lengths(values: NDArray[np.float64]) -> bool:
 
 def _add_distortion(found: Parts, numbers: Numbers, device: str, who: str, alone: str) -> None:
     """Coefficients in OpenCV's order, as many as there are; up to three are radial, with tangential ones."""
-    part, words = f"{device} distortion", f"{who}{_DISTORTION}|{_DISTORTION}{who}{alone}"
+    part, words = f"{device} distortion", f"{who}{_WITHIN}{_DISTORTION}|{_DISTORTION}{who}{alone}"
     name = (
-        found.find(numbers, f"{who}radialdistortion", {1, 2, 3})
+        found.find(numbers, f"{who}{_WITHIN}radialdistortion", {1, 2, 3})
         or found.find(numbers, words, _COEFFICIENTS)
         or found.find(numbers, f"{who}{_SURE}|{_SURE}{who}{alone}", {1, 9})
     )
     if name is None:
-        terms = [found.find(numbers, f"{who}(?:{_DISTORTION})?{term}", {1}) for term in _TERMS]
+        # A letter follows a term: "k11" is a place in a matrix.
+        ways = f"{who}{_WITHIN}(?:{_DISTORTION})?{{0}}|{{0}}(?=[a-z]){who}"
+        terms = [found.find(numbers, ways.format(term), {1}) for term in _TERMS]
         named = ", ".join(each for each in terms if each)
         if named:
             found.add(part, named, np.array([numbers[each].item() if each else 0.0 for each in terms]))
         return
     values = numbers[name].ravel()
     if values.size < 4:
-        tangential = found.find(numbers, f"{who}tangentialdistortion", {2})
+        tangential = found.find(numbers, f"{who}{_WITHIN}tangentialdistortion", {2})
         if tangential is None:
             found.taken.append(f"{name} is without tangential distortion")
         k, p = (
