@@ -244,7 +244,7 @@ def _wave(lines: Lines, pictures: Sequence[int]) -> Complex:
 
 
 def _turns(waves: Sequence[Complex], pairs: NDArray[np.bool_]) -> NDArray[np.float64] | None:
-    """Mean turns of each set over long runs, relative to each other exact; None without any run."""
+    """Mean turns of each set over long runs, relative to each other exact; None if none turns."""
     change = np.stack([np.angle(wave[:, 1:] * np.conj(wave[:, :-1])) / TURN for wave in waves])
     if not pairs.any():
         return None
@@ -264,6 +264,8 @@ def _turns(waves: Sequence[Complex], pairs: NDArray[np.bool_]) -> NDArray[np.flo
     table = np.array(runs)
     finest = int(np.argmax(np.abs(table).mean(0)))
     length = np.abs(table[:, finest])
+    if not length.max() > 0:
+        return None  # the same picture at every step
     longest = table[length >= 0.5 * length.max()]
     ratio = np.median(longest / longest[:, [finest]], axis=0)
     return np.asarray(ratio * table[np.argmax(length), finest])

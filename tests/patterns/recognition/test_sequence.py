@@ -188,6 +188,13 @@ def test_white_and_black_taken_twice_are_no_coarsest_digit(
     assert spare == sum(map(order.count, "WB")) - 2
 
 
+def test_the_very_same_pictures_once_more_are_no_sinusoid(recwarn: pytest.WarningsRecorder) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    found = _recognised([white, white, black, black, *pictures])
+    assert _stripes(found, "columns").bits == 7
+    assert not list(recwarn)
+
+
 def test_white_before_a_gray_code_turns_no_numbers_round_where_no_projector_is_known() -> None:
     pictures, white, black = frames([("columns", Stripes(bits=7))])
     found = _recognised([white, black, *pictures, white, black])
