@@ -117,8 +117,8 @@ def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
         values = values.astype(np.float32)
     if values.dtype.kind == "f" and (unknown := int(np.count_nonzero(np.isnan(values)))):
         raise StoreError(
-            f"{picture} has {unknown} values that are no numbers (NaN). Replace them: what was too bright by"
-            " white, and what is unknown by 0 in all pictures."
+            f"{picture} holds NaN in place of {unknown} of its values. Replace what was too bright by white,"
+            " and what is unknown by 0 in all pictures."
         )
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]

@@ -53,5 +53,5 @@ def test_values_that_are_no_numbers_are_named(tmp_path: Path) -> None:
     values = GREY.astype(np.float32)
     values[2, 3:5] = np.nan
     np.save(tmp_path / "a.npy", values)
-    with pytest.raises(StoreError, match=r"a\.npy has 2 values that are no numbers \(NaN\)"):
+    with pytest.raises(StoreError, match=r"a\.npy holds NaN in place of 2 of its values"):
         load_values(Picture(tmp_path / "a.npy"))
