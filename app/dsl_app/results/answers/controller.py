@@ -45,6 +45,8 @@ class AnswersController:
     def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
         self._request = 0
+        #: The map that is being made: it is given up for the next one, or none.
+        self._job: Job[Materials] | None = None
 
     def from_marks(self, way: Way, cancelled: Callable[[], object] = lambda: None) -> bool:
         """Look for the spectra of all ticked pins, regions and references; False if there are none.
@@ -128,7 +130,18 @@ class AnswersController:
             if request == self._request:
                 cancelled()
 
-        self._runner.submit(Job(title, work, done, failed, undone, is_minor=True))
+        def ended() -> None:
+            if self._job is job:
+                self._job = None
+
+        self._give_up()
+        self._job = job = Job(title, work, done, failed, undone, is_minor=True, on_ended=ended)
+        self._runner.submit(job)
+
+    def _give_up(self) -> None:
+        """Stop what nobody will see: each step of a box would else compute the whole picture to its end."""
+        if self._job is not None:
+            self._job.cancel()
 
     def set_limits(self, worst: float, margin: float) -> None:
         """Change the limits; the picture and the table follow at once."""
@@ -140,6 +153,7 @@ class AnswersController:
     def clear(self) -> None:
         """Show the picture without materials."""
         self._request += 1
+        self._give_up()
         self.state.materials.set(None)
 
     def write(self, result: ResultArrays, materials: Materials, path: Path, overwrite: bool = False) -> None:

@@ -288,6 +288,20 @@ def test_marks_that_are_not_there_leave_the_map_of_a_library_as_it_was(
     assert _shown(bench).name == before.name
 
 
+def test_a_map_that_nobody_will_see_is_given_up(bench: Bench) -> None:
+    runner = ManualRunner()
+    answers = AnswersController(bench.state, runner, bench.notifier)
+    bench.control.marks.pin((30, 5))
+    for _ in range(3):
+        answers.from_marks(Way())
+    answers.clear()
+    answers.from_marks(Way())
+    assert [job.token.is_cancelled for job in runner.waiting] == [True, True, True, False]
+    runner.run_all()
+    assert _shown(bench).name == "marks"
+    answers.clear()
+
+
 @pytest.mark.parametrize("by_marks", [False, True])
 def test_a_map_that_is_cancelled_leaves_what_the_one_before_is_by(
     qtbot: QtBot, bench: Bench, tmp_path: Path, by_marks: bool
