@@ -41,7 +41,9 @@ def test_a_calibration_by_mouse_from_placing_to_accepting(stage: Stage) -> None:
     assert said.text().startswith("Self-test: accepted.")
     assert said.width() == buttons.width(), "the end of the sentence is cut off beside nothing"
     buttons._bar.show()
-    buttons.layout().activate()
+    layout = buttons.layout()
+    assert layout is not None
+    layout.activate()
     assert buttons.sizeHint().height() <= height_px, "the page above jumps"
     buttons._bar.hide()
     assert buttons.leave.text() == "&Close"
