@@ -31,18 +31,20 @@ def frame(number: int) -> Frame:
     return Frame(np.zeros((4, 4), np.uint16), 10.0, frame_id=number)
 
 
+def shown_after_a_fetch(live: LiveController) -> int | None:
+    live.fetch_frame()
+    shown = live.state.frame.value
+    return None if shown is None else shown.frame_id
+
+
 def test_the_last_frame_of_a_live_view_is_not_the_first_of_the_next(live: LiveController) -> None:
     live.rig.state.live.set(True)
     live._post(frame(1), 10.0)
     live.rig.state.live.set(False)
     live.rig.state.live.set(True)
-    live.fetch_frame()
-    assert live.state.frame.value is None, "it is of the time before, and would be exposed for"
+    assert shown_after_a_fetch(live) is None, "it is of the time before, and would be exposed for"
     live._post(frame(2), 10.0)
-    live.fetch_frame()
-    shown = live.state.frame.value
-    assert shown is not None
-    assert shown.frame_id == 2
+    assert shown_after_a_fetch(live) == 2
 
 
 def test_what_one_camera_saw_is_not_shown_as_seen_by_the_next(live: LiveController) -> None:
