@@ -100,7 +100,8 @@ def orient_chart(
         raise CalibrationError(
             f"What was found in {name} does not have the colours of a classic Color Checker in any"
             f" orientation (mean difference {100 * np.expm1(distance):.0f} %). Check that it is the classic"
-            " chart of 24 patches, that its corners are right, and that no colours are swapped."
+            " chart of 24 patches, that nothing covers some of them, that its corners are right, and that the"
+            " picture is not mirrored and no colours are swapped."
         )
     if _signed_area(corners) < 0:
         raise CalibrationError(
