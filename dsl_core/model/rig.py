@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, PositiveFloat, model_validator
 
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import CalibrationNote
@@ -227,7 +227,8 @@ class ProjectorResponse(Record):
     scattered sideways in the film: a column at distance ``d`` px contributes
     ``halo_peak_per_px * exp(-|d| / halo_decay_px)`` of its radiance. Without a measured ``spread`` the blur
     is a Gaussian of rms width ``blur_px``; with one, that is the curve's rms width. Where a ``field`` was
-    measured, all its distances are wider or narrower by place.
+    measured, all its distances are wider or narrower by place. ``colour_widths`` are those of lines as the
+    camera's red, green and blue see them, relative to the common one, where a scan shows that they differ.
     """
 
     gamma: float = Field(default=2.2, gt=0)
@@ -238,6 +239,7 @@ class ProjectorResponse(Record):
     halo_decay_px: float = Field(default=30.0, gt=0)
     spread: LineSpread | None = None
     field: SpreadField | None = None
+    colour_widths: tuple[PositiveFloat, PositiveFloat, PositiveFloat] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -91,7 +91,7 @@ def _mosaic(bayer: BayerPattern, height: int, width: int) -> Tensor:
     return torch.as_tensor(bayer_channels(bayer, height, width).astype(np.uint8).ravel())
 
 
-def _of_colour(values: tuple[float, float, float], rig: Rig, pixels: Tensor, other: Tensor) -> Tensor:
+def of_colours(values: tuple[float, float, float], rig: Rig, pixels: Tensor, other: Tensor) -> Tensor:
     """That of three values which belongs to the colour of each pixel."""
     colours = _mosaic(rig.sensor.bayer, rig.camera.height_px, rig.camera.width_px)[pixels.cpu()].long()
     return like(np.array(values), other)[colours.to(other.device)]
@@ -104,7 +104,7 @@ def projector_points(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> Vectors:
     if rig.lateral_colour is not None:
         # A colour that the camera's lens magnifies comes from nearer to its axis, which is where z is.
         axis = like(rig.pose.matrix[:, 2], rays)[:, None]
-        rays = axis + (rays - axis) / (1 + _of_colour(rig.lateral_colour.camera, rig, pixels, rays))
+        rays = axis + (rays - axis) / (1 + of_colours(rig.lateral_colour.camera, rig, pixels, rays))
     return Vectors(*(rays[i] * depth_mm + t[i] for i in range(3)))
 
 
@@ -114,7 +114,7 @@ def zero_order(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> tuple[Tensor, Tens
     if rig.lateral_colour is None:
         return column, row
     return _magnified(
-        rig, column, row, _of_colour(rig.lateral_colour.projector_of_white, rig, pixels, column)
+        rig, column, row, of_colours(rig.lateral_colour.projector_of_white, rig, pixels, column)
     )
 
 

@@ -225,7 +225,8 @@ def geometry_of(
     """
     maps, flags = found.maps, found.flags
     column_px, noise_px = maps.column_px.reshape(shape), maps.column_std_px.reshape(shape)
-    waves = wave_std_px(column_px, noise_px, maps.refined.reshape(shape), lines).ravel()
+    mosaic = rig.sensor.bayer != "MONO"
+    waves = wave_std_px(column_px, noise_px, maps.refined.reshape(shape), lines, mosaic).ravel()
     if spread_doubt is not None:
         waves = np.hypot(waves, np.where(maps.refined, spread_doubt.at(maps.column_px), np.float32(0.0)))
     # It is of the same waves.

@@ -18,6 +18,7 @@ from dsl_core.progress import Progress
 from dsl_core.reconstruction.camera_spot import follow_spot, spot_finding
 from dsl_core.reconstruction.code_agreement import NamedPlaces, code_agreement
 from dsl_core.reconstruction.code_wave import code_wave, with_varying_width
+from dsl_core.reconstruction.columns.colour_widths import ColourWidths, colour_widths, pixel_colours
 from dsl_core.reconstruction.columns.line_peaks import LinePeaks, comb_peaks, smooth_peaks
 from dsl_core.reconstruction.columns.line_spread import own_spread, spread_pixels, with_own_spread
 from dsl_core.reconstruction.columns.peak_error import peak_error
@@ -124,8 +125,20 @@ class GeometrySteps:
         found = own_spread(self.rig, self._lines, code, white, self._frames)
         self.rig = with_own_spread(self.rig, found)
         peaks = smooth_peaks(self.rig, self._lines, code, white, self._frames)
+        widths = None if peaks is None else self._colour_widths(peaks, code, white)
+        if widths is not None and widths.differ:
+            self.findings.append(widths.finding())
+            self.rig = widths.of(self.rig)
+            peaks = smooth_peaks(self.rig, self._lines, code, white, self._frames)
         asked = comb_peaks(self.rig, self._lines, code, white, self._frames) if peaks is None else peaks
         return _Spread(found, spread_doubt(peaks, found), _error_of(asked))
+
+    def _colour_widths(self, peaks: LinePeaks, code: DecodedCode, white: MergedFrame) -> ColourWidths | None:
+        """The widths of lines in each colour; None without colours, or where lines do not tell."""
+        if self.rig.sensor.bayer == "MONO":
+            return None
+        pixels = spread_pixels(self._lines, code, white)
+        return colour_widths(peaks, pixel_colours(self.rig, pixels))
 
     def _own_width(
         self,

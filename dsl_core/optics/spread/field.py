@@ -16,7 +16,7 @@ from torch import Tensor
 
 from dsl_core.model.projector.spread_field import POWERS, SpreadField
 from dsl_core.model.rig import ProjectorResponse, Rig
-from dsl_core.optics.correspondence import triangulate, zero_order
+from dsl_core.optics.correspondence import of_colours, triangulate, zero_order
 from dsl_core.optics.lines.profile import LineTable
 from dsl_core.optics.spread.equations import MAX_SHIFT_PX, MIN_PIXELS, MODEL_ERROR, View, settle, unit
 
@@ -60,10 +60,12 @@ def places_of(rig: Rig, pixels: Tensor, column_px: Tensor) -> Tensor:
 
 def widths_at(rig: Rig, pixels: Tensor, column_px: Tensor) -> Tensor | None:
     """Relative widths of the spread at pixels by their columns; None where one width holds for all."""
-    field = rig.projector_response.field
+    field, colours = rig.projector_response.field, rig.projector_response.colour_widths
+    by_colour = None if colours is None else of_colours(colours, rig, pixels, column_px)
     if field is None:
-        return None
-    return relative_width(field, *places_of(rig, pixels, column_px)).to(column_px)
+        return by_colour
+    by_place = relative_width(field, *places_of(rig, pixels, column_px)).to(column_px)
+    return by_place if by_colour is None else by_place * by_colour
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,8 @@ EDGE_STEPS = 4.0
 REGIONS = (4, 6)
 #: Runs of a region, at least and at most, and how often they are asked: each time most of a wave is found.
 FEWEST, MOST, ASKED = 30, 400, 3
+#: The four sites of a mosaic of colours.
+SITES = tuple((slice(row, None, 2), slice(column, None, 2)) for row in (0, 1) for column in (0, 1))
 #: Columns are quiet with less noise than this, px.
 QUIET_PX = 0.1
 #: Pixels of a run that lines refined, at least.
@@ -170,18 +172,35 @@ def wave_std_px(
     column_std_px: NDArray[np.floating],
     refined: NDArray[np.bool_],
     lines: LineSet | None,
+    mosaic: bool = False,
 ) -> NDArray[np.float32]:
     """Rms of the waves around each pixel (rows, columns), px; 0 where there are none or nobody can tell.
 
     ``column_px`` and ``column_std_px`` (rows, columns) are the columns of all pixels with their noise, and
     ``refined`` where lines refined them. Regions too small to tell have what the whole picture tells.
+    Neighbours of a ``mosaic`` see lines of different LEDs, whose waves may be opposite: there each of its
+    four sites is asked by itself as well.
 
     On the flat middle of a line that is as wide as the step noise displaces columns by quarters of a pixel,
     to either side of the middle, which is a wave, too: it is no other pixel's.
     """
-    std = np.zeros(column_px.shape, np.float32)
     if lines is None or not lines.single:
-        return std
+        return np.zeros(column_px.shape, np.float32)
+    std = _waves_of(column_px, column_std_px, refined, lines)
+    for site in SITES if mosaic else ():
+        own = _waves_of(column_px[site], column_std_px[site], refined[site], lines)
+        std[site] = np.maximum(std[site], own)
+    return std
+
+
+def _waves_of(
+    column_px: NDArray[np.floating],
+    column_std_px: NDArray[np.floating],
+    refined: NDArray[np.bool_],
+    lines: LineSet,
+) -> NDArray[np.float32]:
+    """What `wave_std_px` gives for a picture, or for one site of its mosaic."""
+    std = np.zeros(column_px.shape, np.float32)
     quiet = refined & (column_std_px < QUIET_PX)
     usual = _rms(column_px, quiet, lines.step_px) or 0.0
     noisy = _rms(column_px, refined, lines.step_px) or 0.0

@@ -172,3 +172,18 @@ def test_a_projector_is_not_out_of_focus_where_any_surface_shows_sharp_lines(
     assert found is not None
     assert found.changed == follows
     assert found.response.blur_px == pytest.approx(1.2 if follows else 0.6, abs=0.02)
+
+
+def test_colours_whose_waves_are_opposite_hide_none_in_a_mosaic() -> None:
+    """A projector focuses blue elsewhere than red: their columns are off to opposite sides."""
+    y, x = np.mgrid[:160, :240].astype(float)
+    column = 40 + 0.83 * x + 0.113 * y
+    sign = np.where((x + y) % 2 == 0, 1.0, -1.0)
+    noise = 0.005 * np.random.default_rng(0).standard_normal(column.shape)
+    waved = column + sign * 0.06 * np.sin(np.pi * column) + noise
+    refined = np.ones(column.shape, bool)
+    assert wave_std_px(waved, QUIET, refined, LINES).max() < 0.01
+    std = wave_std_px(waved, QUIET, refined, LINES, mosaic=True)
+    assert std.min() > 0.9 * 0.06 / np.sqrt(2)
+    assert std.max() < 1.1 * 0.06 / np.sqrt(2)
+    assert wave_std_px(column + noise, QUIET, refined, LINES, mosaic=True).max() < 0.003
