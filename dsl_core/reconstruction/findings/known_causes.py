@@ -27,8 +27,10 @@ from dsl_core.reconstruction.spectral.order_balance import BALANCE
 MOST_LEFT, SIGMAS = 0.05, 4.5
 #: What bands that are too wide for the lines look like: straight pieces follow no spectrum then.
 BY_WIDE_BANDS = frozenset({POOR_AREAS, POOR_FIT, COLOUR_GAINS, COLOURS_DISAGREE, MISFIT})
+#: What orders that share the light otherwise than spectra can follow look like: no spectrum suits both.
+BY_BALANCE = frozenset({POOR_AREAS, POOR_FIT, MISFIT})
 #: What else follows from each cause; where pixels have other colours than stated, the model says nothing.
-EFFECTS = {WIDE_BANDS: BY_WIDE_BANDS, MOSAIC: BY_WIDE_BANDS | {BALANCE}}
+EFFECTS = {WIDE_BANDS: BY_WIDE_BANDS, MOSAIC: BY_WIDE_BANDS | {BALANCE}, BALANCE: BY_BALANCE}
 
 
 def with_known_causes(findings: Iterable[FitFinding]) -> list[FitFinding]:
@@ -55,7 +57,7 @@ def _by_black(finding: FitFinding) -> FitFinding:
 
 
 def without_effects(findings: Iterable[FitFinding]) -> list[FitFinding]:
-    """The same findings, where bands too wide for the lines, or a wrong mosaic, may be all that does not fit.
+    """The same findings, where too wide bands, a wrong mosaic or a turned film may be all that does not fit.
 
     Nobody should look for a fault of the film or the surface before that is mended.
     """

@@ -101,6 +101,16 @@ def test_pixels_of_other_colours_than_stated_are_told_before_film_and_surface(
     assert ("It is off." in fit.words) == is_told
 
 
+@pytest.mark.parametrize("ratio", [-0.46, -0.1])
+def test_a_turned_film_is_told_before_the_surfaces_that_no_spectrum_explains(ratio: float) -> None:
+    """All surfaces were called fluorescent or translucent first, as no spectrum suits exchanged orders."""
+    surfaces = [finding(name, 0.98, "Surfaces are fluorescent.") for name in (POOR_AREAS, MISFIT)]
+    orders = FitFinding.judged("orders", BALANCE, ratio, "1", 0.25, "The film has been turned over.", "")
+    fit = Fit.of(without_effects([*surfaces, orders]))
+    assert ("The film has been turned over." in fit.words) == (ratio < -0.25)
+    assert ("fluorescent" in fit.words) == (ratio > -0.25)
+
+
 @pytest.mark.parametrize("name", [POOR_AREAS, MISFIT, GAIN_OF_BOTH, ORDERS_APART, DRIFT_LEFT])
 @pytest.mark.parametrize("step_nm", [5.0, 10.0])
 def test_before_a_rig_is_blamed_bands_are_made_finer(name: str, step_nm: float) -> None:
