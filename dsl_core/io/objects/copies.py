@@ -88,7 +88,7 @@ def require_free(objects: ObjectFolder, *, overwrite: bool) -> dict[str, Found]:
         # Arrays of other programs are called the same.
         if "schema_version" not in _attributes(objects.get(METADATA_NAME) or b""):
             raise StoreError(
-                f"{objects.address} contains arrays that are no result of this program, and is not replaced."
+                f"{objects.address} contains arrays that this program did not write, and is not replaced."
                 " Choose another name."
             )
         if not overwrite:
