@@ -54,7 +54,9 @@ def correlation_of(
     good = np.ones(reflectance[0].shape, bool)
     if flags is not None:
         good = (flags & ~np.asarray(int(Flag.BANDS_UNREACHED), flags.dtype)) == 0
-    learned = band_correlation(reflectance[known], std[known], good, _QUICK_PAIRS)
+    if not known.all():
+        reflectance, std = reflectance[known], std[known]
+    learned = band_correlation(reflectance, std, good, _QUICK_PAIRS)
     if learned is not None:
         found[np.ix_(known, known)] = learned
     return found
