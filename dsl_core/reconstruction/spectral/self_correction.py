@@ -96,7 +96,7 @@ def follow(
     turn = None
     if motion is not None:
         film, of_film = doubt or (model, found)
-        turn = None if of_film is None else find_turn(scan, motion, of_film, film, probe, rows_px)
+        turn = None if of_film is None else find_turn(scan, motion, of_film, film, probe, rows_px, found)
     causes = fit_causes(found)
     balanced = corrected(model, causes)
     if balanced is None:

@@ -9,7 +9,7 @@ make it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,10 +87,12 @@ def find_turn(
     moved: PixelModel,
     probe: Callable[[ProbedScan], Probe | None],
     rows_px: float | None = None,
+    now: Probe | None = None,
 ) -> Turn | None:
     """What of a film's ``motion`` may be a changed pose; None where models know of neither, or it is not.
 
-    ``scan`` has the model as calibrated, ``of_film`` is what a ``probe`` says with the film ``moved``.
+    ``scan`` has the model as calibrated, ``of_film`` is what a ``probe`` says with the film ``moved``, and
+    ``now`` with the film where it is taken to be, None where that is the same.
     ``rows_px`` is how far (rms) rows lie from where a code names them, None where it names none.
     """
     if not isinstance(scan.model.correspondence, GratingModel):
@@ -103,7 +105,10 @@ def find_turn(
     asked = np.flatnonzero(np.isfinite(there.pixels.depth_mm))
     share = there.pixels.depth_mm.ravel()[asked] / scan.pixels.depth_mm.ravel()[asked] - 1
     depth_share = float(np.sqrt(np.mean(share**2))) if asked.size else 0.0
-    belief = _belief(motion, _surer(of_film, probe(there)), motion.may_be_dent(orders_off_px(rig)))
+    of_pose = probe(there)
+    belief = _belief(
+        motion, _surer((of_film, now or of_film), of_pose), motion.may_be_dent(orders_off_px(rig))
+    )
     return Turn(rig, *belief, depth_share)
 
 
@@ -191,11 +196,17 @@ def _refuted(scan: ProbedScan, there: ProbedScan, of_film: Probe, rows_px: float
     return expected_px > TELLING_ROWS_PX and rows_px < ROWS_SEEN * expected_px
 
 
-def _surer(of_film: Probe, of_pose: Probe | None) -> float:
-    """By how many deviations frames of pixels fit a changed pose better than a moved film."""
-    if of_pose is None:
-        return 0.0
-    both = of_film.sound & of_pose.sound
-    fall = (of_film.chi_square - of_pose.chi_square)[both]
+def _surer(others: Iterable[Probe], of_pose: Probe | None) -> float:
+    """By how many deviations frames of pixels fit a changed pose better than any of the ``others``.
+
+    A moved film that fits worse than the calibrated one makes no pose better than that.
+    """
+    return 0.0 if of_pose is None else min(_better(each, of_pose) for each in others)
+
+
+def _better(before: Probe, after: Probe) -> float:
+    """By how many deviations frames of pixels fit better after than before."""
+    both = before.sound & after.sound
+    fall = (before.chi_square - after.chi_square)[both]
     scatter = float(fall.std()) / max(float(both.sum()) ** 0.5, 1.0)
     return float(fall.mean()) / scatter if both.sum() > 1 and scatter > 0 else 0.0

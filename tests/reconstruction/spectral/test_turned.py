@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -17,7 +19,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.findings.model_findings import MOVED, TURNED
 from dsl_core.reconstruction.spectral.film_motion import PRIOR_STD, FilmMotion, with_film
-from dsl_core.reconstruction.spectral.turned import EITHER, IMPLAUSIBLE, SURELY, _belief, with_pose
+from dsl_core.reconstruction.spectral.probing.probe import Probe
+from dsl_core.reconstruction.spectral.turned import EITHER, IMPLAUSIBLE, SURELY, _belief, _surer, with_pose
 from dsl_core.workflows import truths
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
@@ -102,3 +105,17 @@ def test_what_frames_fit_better_is_believed_unless_no_film_can_have_moved_so_far
     assert far.may_be_dent(far.shift_px / 2)
     assert not far.may_be_dent(far.shift_px / 4)
     assert _belief(replace(slip, shift_std_px=0.05), 0.0)[0] == pytest.approx(np.hypot(EITHER, 0.5))
+
+
+def test_a_pose_has_to_fit_better_than_the_calibration_too_not_only_than_a_wrong_motion() -> None:
+    """LEDs 3 nm longer displace orders a little: the film fitted to that fits worse, as the pose does."""
+    noise = np.random.default_rng(1).normal(0, 0.05, (3, 200))
+
+    def fits(chi_square: float, index: int) -> Probe:
+        return cast(Probe, SimpleNamespace(sound=np.ones(200, bool), chi_square=chi_square + noise[index]))
+
+    film, calibrated = fits(1.3, 0), fits(1.0, 1)
+    assert _surer((film, film), fits(1.02, 2)) > SURELY
+    assert _surer((film, calibrated), fits(1.02, 2)) < 0
+    assert _surer((film, calibrated), fits(0.8, 2)) > SURELY
+    assert _surer((film,), None) == 0.0
