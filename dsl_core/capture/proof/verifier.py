@@ -71,7 +71,7 @@ class FrameProof:
 
     def judge(self, shot: Shot, pixels: NDArray[np.uint16]) -> Finding:
         """What the raw mosaic of a shot shows; remembers it for the shots after it, unless it is wrong."""
-        if has_row_copies(pixels):
+        if has_row_copies(pixels) and not self.whole.has_no_noise():
             return Finding(shot, Verdict.ROWS_TWICE, (shot,))
         return self.judge_raster(shot, self._known.raster.take(pixels))
 

@@ -13,7 +13,7 @@ from dsl_core.capture.proof.colour_again import ColourAgain, colour_again
 from dsl_core.capture.proof.judging.known import Known
 from dsl_core.capture.proof.lasting.coarse_values import coarse_values
 from dsl_core.capture.proof.lasting.ends import sentences_of_ends
-from dsl_core.capture.proof.lasting.light_noise import is_stated, light_noise, noise_times
+from dsl_core.capture.proof.lasting.light_noise import has_no_noise, is_stated, light_noise, noise_times
 from dsl_core.capture.proof.lasting.pair_places import pair_places
 from dsl_core.capture.proof.lasting.sharp_edges import sharp_edges
 from dsl_core.capture.proof.lasting.soft_stripes import soft_stripes
@@ -55,6 +55,10 @@ class WholeScan:
         settings = range(len(known.plan.settings))
         found = (local_sum(known.plan, n, known.kept, lit, known.noise, known.raster) for n in settings)
         return [each for each in found if each is not None]
+
+    def has_no_noise(self) -> bool:
+        """Whether the first code shows pictures without any noise, as only computed ones are."""
+        return has_no_noise(self._known.code_pairs(), self._known.noise, self._known.raster)
 
     def calm_lines(self) -> CalmLines | None:
         """Lines that have less noise than the calibration says, as only a camera's processing makes them."""

@@ -17,8 +17,7 @@ def coarse_values(pictures: Iterable[Counts], sensor: Sensor) -> str:
     Noise carries light across smaller steps; across larger ones, dark pixels of two pictures differ by a step
     or by nothing.
     """
-    total = np.sum([np.bincount(each, minlength=2**sensor.bit_depth) for each in pictures], axis=0)
-    step_dn = step_of(np.asarray(total, np.int64))
+    step_dn = step_of(np.bincount(np.concatenate(list(pictures))))
     if step_dn <= sensor.step_dn or not sensor.model_copy(update={"step_dn": step_dn}).rounds_light:
         return ""
     bits = sensor.bit_depth - round(np.log2(step_dn))

@@ -69,19 +69,29 @@ def noise_times(pairs: Mapping[int, Pair], noise: Noise, raster: Raster) -> floa
     Every pair adds up to the same light, so that sums differ by noise alone. None where there is too little
     light to tell, or pairs disagree.
     """
-    chosen = [pairs[number] for number in sorted(pairs)[:PAIRS]]
-    if len(chosen) < PAIRS:
-        return None
-    # Pictures of less bits than the camera's have the noise of rounding, too.
-    values = np.bincount(np.concatenate([each for pair in chosen for each in pair]))
-    rounding = np.float32(step_of(values) ** 2 / 12)
-    found = [
-        times for one, other in pairwise(chosen) if (times := _times(one, other, noise, raster, rounding))
-    ]
+    found = _times_of_pairs(pairs, noise, raster)
     if len(found) < PAIRS - 1 or min(found) < NO_NOISE or max(found) > AGREE * min(found):
         return None
     # All of them are beyond what a self-test leaves open, or none is.
     return 1.0 if min(found) <= OTHER and max(found) >= 1 / OTHER else float(np.median(found))
+
+
+def has_no_noise(pairs: Mapping[int, Pair], noise: Noise, raster: Raster) -> bool:
+    """Whether the ``pairs`` of a code, as for `noise_times`, have the same sums to the count."""
+    found = _times_of_pairs(pairs, noise, raster)
+    return bool(found) and min(found) < NO_NOISE
+
+
+def _times_of_pairs(pairs: Mapping[int, Pair], noise: Noise, raster: Raster) -> list[float]:
+    """The variance of each of the widest pairs and the next one over that stated, where light tells."""
+    chosen = [pairs[number] for number in sorted(pairs)[:PAIRS]]
+    if len(chosen) < PAIRS:
+        return []
+    # Pictures of less bits than the camera's have the noise of rounding, too.
+    values = np.bincount(np.concatenate([each for pair in chosen for each in pair]))
+    rounding = np.float32(step_of(values) ** 2 / 12)
+    found = (_times(one, other, noise, raster, rounding) for one, other in pairwise(chosen))
+    return [each for each in found if each is not None]
 
 
 def _times(one: Pair, other: Pair, noise: Noise, raster: Raster, rounding: np.float32) -> float | None:

@@ -23,3 +23,8 @@ def test_steps_larger_than_the_noise_hide_light(bits_lost: int, noise_dn: float,
 def test_steps_that_a_calibration_knows_are_none_of_its_changes() -> None:
     light = np.random.default_rng(2).uniform(200, 3000, 20_000).astype(np.uint16)
     assert coarse_values([(light >> 4 << 4).astype(np.uint16)], Sensor(read_noise_dn=1.0, step_dn=16)) == ""
+
+
+def test_values_beyond_the_bits_of_the_camera_are_counted_as_well() -> None:
+    beyond = np.arange(0, 9000, 3, np.uint16)
+    assert coarse_values([np.arange(100, dtype=np.uint16), beyond], Sensor(read_noise_dn=1.0)) == ""

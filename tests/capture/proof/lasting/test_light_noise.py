@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.proof.lasting.light_noise import light_noise
+from dsl_core.capture.proof.lasting.light_noise import has_no_noise, light_noise
 from dsl_core.capture.proof.noise import Noise
 from dsl_core.capture.proof.raster import Raster
 from dsl_core.model.rig import Sensor
@@ -68,4 +68,6 @@ def test_without_noise_or_light_nothing_is_told() -> None:
     one = pairs_of()[0]
     still = dict.fromkeys(range(4), one)
     assert light_noise(still, Noise(SENSOR), RASTER) is None
+    assert has_no_noise(still, Noise(SENSOR), RASTER)
+    assert not has_no_noise(pairs_of(0.5), Noise(SENSOR), RASTER)
     assert light_noise(pairs_of(lamps=(0.002,) * 4), Noise(SENSOR), RASTER) is None
