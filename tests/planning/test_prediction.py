@@ -129,14 +129,14 @@ def test_black_that_saturates_is_a_plan_without_depth_and_no_crash() -> None:
 @pytest.mark.parametrize(
     ("changed", "least_rmse", "least_coverage"),
     [
-        ({"projector_response": {"blur_px": 0.2}}, 0.003, 0.99),
+        ({"projector_response": {"blur_px": 0.2}}, 0.0025, 0.99),
         ({"sensor": {"read_noise_dn": 20.0}}, 0.005, 0.78),
     ],
 )
 def test_patch_means_have_what_noise_does_to_them_and_first_orders_help_to_decode(
     changed: dict[str, dict[str, float]], least_rmse: float, least_coverage: float
 ) -> None:
-    """Trials of these plans found 0.0055, and 0.0115 with a depth in 90 % of the picture."""
+    """Trials of these plans found 0.0030, and 0.0115 with a depth in 90 % of the picture."""
     rig = published_rig()
     parts = {part: getattr(rig, part).model_copy(update=values) for part, values in changed.items()}
     rig = rig.model_copy(update={**parts, "camera": rig.camera.resized(112, 72)})

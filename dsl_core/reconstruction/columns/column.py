@@ -82,9 +82,11 @@ def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
     fit = fit_peaks(peaks, model_error)
     unusual = _is_unusual(fit)
     poor = torch.nonzero(unusual).ravel()
+    error = torch.full_like(fit.amplitude, model_error)
     if not single and model_error < COMB_ERROR and len(poor):
         # What most peaks leave says little of a colour, or a material, whose first orders are bright.
         fit = _best_of(fit, poor, (fit_peaks(peaks.some(poor), COMB_ERROR),))
+        error[poor] = COMB_ERROR
         unusual = _is_unusual(fit)
     if single and len(poor):
         # Sharp lines show no slope but at their ends, where a fit may have to begin.
@@ -110,7 +112,7 @@ def refine(peaks: LinePeaks, model_error: float | None = None) -> Column:
     loose = torch.nonzero(good & ~unusual & is_loose).ravel()
     if len(loose):
         scale, by_slopes = chi_square[loose].clip(min=1), q[loose]
-        q[loose], std = loose_columns(peaks.some(loose), model_error, fit.amplitude[loose], scale)
+        q[loose], std = loose_columns(peaks.some(loose), error[loose] * fit.amplitude[loose], scale)
         # Light that saturates lines may saturate the code as well, which is off by some columns then.
         std_px[loose] = torch.where(saturated[loose], torch.maximum(std, (q[loose] - by_slopes).abs()), std)
     std_px = torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12)))

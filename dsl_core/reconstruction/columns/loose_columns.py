@@ -17,18 +17,16 @@ LOOSE_PX, FARTHEST_PX, PLACES = 0.08, 1.2, 49
 CODE_STD_PX = 0.15
 
 
-def loose_columns(
-    peaks: LinePeaks, model_error: float, amplitude: Tensor, scale: Tensor
-) -> tuple[Tensor, Tensor]:
+def loose_columns(peaks: LinePeaks, model_error: Tensor, scale: Tensor) -> tuple[Tensor, Tensor]:
     """Mean and deviation (px) of columns (pixels,) over all places that explain the lines and the code.
 
-    ``amplitude`` (pixels,) is that of the fitted peak, ``model_error`` relative to it; ``scale`` is how many
-    times too large chi-squares are.
+    ``model_error`` (pixels,) is that of the modelled peak, in its units; ``scale`` is how many times too large
+    chi-squares are.
     """
     coarse_px = peaks.coarse_px
     places = torch.linspace(-FARTHEST_PX, FARTHEST_PX, PLACES).to(coarse_px)
     y, variance, centres = peaks.window()
-    weight = 1 / (variance + (model_error * amplitude) ** 2)
+    weight = 1 / (variance + model_error**2)
     reach_px = float((coarse_px - centres).abs().max()) + FARTHEST_PX
     table = peaks.table(coarse_px, reach_px)
     likely = torch.empty((PLACES, len(coarse_px))).to(coarse_px)

@@ -140,8 +140,12 @@ def test_a_name_that_is_taken_is_told_before_work_begins(twin: ObjectStoreTwin, 
     ("name", "content", "told"),
     [
         ("notes.txt", b"mine", r"contains notes\.txt"),
-        ("zarr.json", b'{"zarr_format": 3, "attributes": {"title": "rain"}}', "arrays that are no result"),
-        ("zarr.json", b"{", "arrays that are no result"),
+        (
+            "zarr.json",
+            b'{"zarr_format": 3, "attributes": {"title": "rain"}}',
+            "arrays that this program did not write",
+        ),
+        ("zarr.json", b"{", "arrays that this program did not write"),
     ],
 )
 @pytest.mark.parametrize("overwrite", [False, True])

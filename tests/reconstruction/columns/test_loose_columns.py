@@ -21,7 +21,7 @@ def weighed(column_px: float, coarse_px: float, noise: float) -> tuple[float, fl
     centres = 2.0 + 5.0 * torch.arange(20, dtype=torch.float64)[:, None]
     light = zero_order_profile(column_px - centres, -2.5, 2.5, RESPONSE)
     peaks = LinePeaks(coarse_px * ONE, light, torch.full_like(light, noise), LINES, RESPONSE)
-    mean, deviation = loose_columns(peaks, 0.0, ONE, ONE)
+    mean, deviation = loose_columns(peaks, 0.0 * ONE, ONE)
     return float(mean), float(deviation)
 
 

@@ -25,8 +25,10 @@ def test_three_colours_hold_the_mosaic() -> None:
     plain = Renderer(world.rig, world.truth)
     for image in IMAGES:
         planes, mosaic = plain.planes(image), plain.expected(image)
-        assert np.array_equal(planes[0, ::2, ::2], mosaic[::2, ::2])
-        assert np.array_equal(planes[2, 1::2, 1::2], mosaic[1::2, 1::2])
+        # White lines are rendered once for all settings, and then made as bright: to the precision of that.
+        for colour, start in ((0, 0), (2, 1)):
+            own = mosaic[start::2, start::2]
+            np.testing.assert_allclose(planes[colour, start::2, start::2], own, rtol=2e-6)
 
 
 def test_all_effects_left_out_but_the_usual_ones_give_the_plain_picture() -> None:

@@ -26,5 +26,5 @@ def test_steps_that_a_calibration_knows_are_none_of_its_changes() -> None:
 
 
 def test_values_beyond_the_bits_of_the_camera_are_counted_as_well() -> None:
-    beyond = np.arange(0, 9000, 3, np.uint16)
+    beyond = np.arange(0, 9000, 3, dtype=np.uint16)
     assert coarse_values([np.arange(100, dtype=np.uint16), beyond], Sensor(read_noise_dn=1.0)) == ""
