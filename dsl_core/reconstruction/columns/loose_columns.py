@@ -20,8 +20,8 @@ CODE_STD_PX = 0.15
 def loose_columns(peaks: LinePeaks, model_error: Tensor, scale: Tensor) -> tuple[Tensor, Tensor]:
     """Mean and deviation (px) of columns (pixels,) over all places that explain the lines and the code.
 
-    ``model_error`` (pixels,) is that of the modelled peak, in its units; ``scale`` is how many times too large
-    chi-squares are.
+    ``model_error`` (pixels,) is that of the modelled peak, in its units; ``scale`` is how many times too
+    large chi-squares are.
     """
     coarse_px = peaks.coarse_px
     places = torch.linspace(-FARTHEST_PX, FARTHEST_PX, PLACES).to(coarse_px)
