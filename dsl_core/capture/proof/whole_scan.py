@@ -152,8 +152,9 @@ class WholeScan:
         )
 
     def _light_noise(self) -> str:
-        known = self._known
-        if known.calibration is None or not known.knows_light:
+        known, whole = self._known, self.code_sum()
+        # Values that are not proportional to the light have another slope, and noise, at each brightness.
+        if known.calibration is None or not known.knows_light or (whole is not None and whole.is_curved):
             return ""
         found = light_noise(known.code_pairs(), known.noise, known.raster)
         return "" if found is None else found.sentence
